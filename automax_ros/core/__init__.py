@@ -1,1 +1,1 @@
-"""What every room uses: text, numbers, values and types of the AutoMax languages, integer time, diagnostics, YAML."""
+"""Shared by all rooms: text, numbers, values and types of the AutoMax languages, integer time, diagnostics, YAML."""

@@ -1,12 +1,11 @@
-"""Modules of this package that were compiled ahead of time: found, checked for being fresh, and loaded.
+"""Finds the modules of this package that were compiled ahead of time, checks that they are fresh, and loads them.
 
-The Python files are the reference and always there. Machine code made from them (by mypyc, `make setup`) lies in a
-folder ``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter;
-nothing else is looked at. A group of modules is used only if every source that it was made from, and every source that
-its types came from, still has the same content (decision): whoever edits a file runs what was edited. Where libraries
-are missing, cannot be loaded on this machine, or call another module's C in a version that is not there, the Python
-files run too; ``automax --version`` says why.
-``AUTOMAX_COMPILED=off`` in the environment switches all of it off.
+The Python files are the reference and always exist. Machine code made from them (by mypyc, `make setup`) is in a folder
+``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter; no other
+place is searched. A group of modules is used only if every source that it was made from, and every source that its
+types came from, still has the same content (decision): whoever edits a file runs what was edited. If libraries are
+missing, cannot be loaded on this machine, or call another module's C in a version that is not there, the Python files
+run too; ``automax --version`` says why. ``AUTOMAX_COMPILED=off`` in the environment switches all of it off.
 """
 
 from __future__ import annotations
@@ -25,13 +24,12 @@ OFF = ("off", "0", "no", "false")
 
 
 class CompiledGroup:
-    """Modules that are loaded together: ``libraries`` by name of module, ``sources`` with what their content was.
+    """Modules that are loaded together: ``libraries`` by name of module, ``sources`` with digests of their content.
 
-    ``sizes`` has the bytes of each library: one that was copied by half would end the process when it is loaded.
-    ``interfaces`` has the version of the C interface of other modules that the libraries call: the binary one, and the
-    least of what it offers.
-    ``stale`` is empty as long as the group may be used, otherwise it says why not; None before the first of its modules
-    was asked for.
+    ``sizes`` has the bytes of each library: a truncated one would end the process when it is loaded. ``interfaces`` has
+    the version of the C interface of other modules that the libraries call: the binary one, and the lowest feature
+    version. ``stale`` is empty while the group may be used, otherwise the reason why not; None before the first of its
+    modules is requested.
     """
 
     def __init__(self, name: str) -> None:
@@ -44,7 +42,7 @@ class CompiledGroup:
         self.stale: str | None = None
 
     def fresh(self, package: str) -> bool:
-        """Whether the sources below the folder ``package`` are those that were compiled; looked at once."""
+        """Return whether the sources below the folder ``package`` are those that were compiled; checked once."""
         if self.stale is None:
             harmed = (_harmed(file, size) for file, size in self.sizes.items())
             changed = (_changed(package, file, digest) for file, digest in self.sources.items())
@@ -53,7 +51,7 @@ class CompiledGroup:
         return not self.stale
 
     def loads(self) -> bool:
-        """Whether this machine loads the library that its modules share; asked of a group that is fresh."""
+        """Return whether this machine loads the library that the modules of a fresh group share."""
         for name in self.libraries:
             if name not in self.modules and not self.stale:
                 try:
@@ -63,24 +61,24 @@ class CompiledGroup:
         return not self.stale
 
     def refuse(self, error: ImportError) -> None:
-        """Note that the library cannot be loaded."""
+        """Record that the library cannot be loaded."""
         self.stale = f"its library cannot be loaded: {error}"
 
     @property
     def has_begun(self) -> bool:
-        """Whether the library that its modules share is loaded: they are machine code from then on, all or none."""
+        """Whether the library that its modules share is loaded: all of them are machine code from then on, or none."""
         return any(name in sys.modules for name in self.libraries if name not in self.modules)
 
 
 class CompiledLoader(ExtensionFileLoader):
-    """Loads a module of a group; where the machine cannot load the group's first one, the Python file (decision)."""
+    """Loads a module of a group; if the machine cannot load the group's first one, the Python file (decision)."""
 
     def __init__(self, name: str, file: str, group: CompiledGroup, source: str) -> None:
         super().__init__(name, file)
         self.group, self.source = group, source
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return the module, or None for one that the Python file then fills."""
+        """Return the module, or None if the Python file is to be used."""
         try:
             return super().create_module(spec)
         except ImportError as error:
@@ -92,7 +90,7 @@ class CompiledLoader(ExtensionFileLoader):
 
 
 class CompiledFinder:
-    """Finds compiled modules, asked before Python looks for the files (``sys.meta_path``)."""
+    """Finds compiled modules, before Python searches for the files (``sys.meta_path``)."""
 
     def __init__(self, groups: Sequence[CompiledGroup], package: str) -> None:
         self.groups = tuple(groups)
@@ -100,7 +98,7 @@ class CompiledFinder:
         self._groups = {name: group for group in groups for name in group.libraries}
 
     def find_spec(self, fullname: str, *_: object) -> ModuleSpec | None:
-        """Return where the machine code of a module is; None if there is none, or none that is fresh."""
+        """Return the location of a module's machine code; None if there is none, or none that is fresh."""
         group = self._groups.get(fullname)
         if group is None or not group.fresh(self.package):
             return None
@@ -112,19 +110,19 @@ class CompiledFinder:
 
 
 def source_digest(content: bytes) -> str:
-    """Return a short digest of a source, as Python makes it for .pyc files that are checked by content."""
+    """Return a short digest of a source, as in .pyc files that are checked by content."""
     from importlib.util import source_hash
 
     return source_hash(content).hex()
 
 
 def switched_off() -> bool:
-    """Whether the environment says that plain Python shall run."""
+    """Return whether the environment selects plain Python."""
     return os.environ.get(VARIABLE, "").strip().lower() in OFF
 
 
 def install(package: str) -> None:
-    """Let compiled modules be found, if there are any for the package in the folder ``package``."""
+    """Install the finder of compiled modules, if there are any for the package in the folder ``package``."""
     if switched_off():
         return
     for folder in _folders(package):
@@ -135,7 +133,7 @@ def install(package: str) -> None:
 
 
 def read_index(folder: str) -> list[CompiledGroup]:
-    """Return the groups that a folder holds for this interpreter; none if it is not there or of another form."""
+    """Return the groups in a folder for this interpreter; none if the folder is missing or has another form."""
     try:
         with open(os.path.join(folder, INDEX), encoding="utf-8") as file:
             lines = [line.rstrip("\n").split("\t") for line in file]
@@ -146,7 +144,7 @@ def read_index(folder: str) -> list[CompiledGroup]:
     try:
         return _groups(folder, lines[1:])
     except (IndexError, ValueError):
-        return []  # it was not written to its end
+        return []  # it is truncated
 
 
 def _groups(folder: str, lines: Sequence[list[str]]) -> list[CompiledGroup]:
@@ -168,7 +166,7 @@ def _groups(folder: str, lines: Sequence[list[str]]) -> list[CompiledGroup]:
 
 
 def describe(package: str) -> list[str]:
-    """Return what runs, for people: one line, and one for each group that is not used, with the reason."""
+    """Describe the code that runs: one line, and one for each group that is not used, with the reason."""
     if switched_off():
         return [f"plain Python: {VARIABLE}={os.environ[VARIABLE]}"]
     finder = next((finder for finder in sys.meta_path if isinstance(finder, CompiledFinder)), None)
@@ -181,7 +179,7 @@ def describe(package: str) -> list[str]:
 
 
 def _folders(package: str) -> tuple[str, ...]:
-    """The places of the installation: next to the package (a wheel), or the interpreter's own site-packages."""
+    """Return the places of the installation: next to the package (a wheel), or the interpreter's site-packages."""
     import sysconfig
 
     return (
@@ -191,7 +189,7 @@ def _folders(package: str) -> tuple[str, ...]:
 
 
 def _harmed(file: str, size: int) -> str:
-    """Why a library is not what was built; empty if it is."""
+    """Return why a library is not as it was built; empty if it is."""
     try:
         found = os.path.getsize(file)
     except OSError:
@@ -200,7 +198,7 @@ def _harmed(file: str, size: int) -> str:
 
 
 def _changed(package: str, file: str, digest: str) -> str:
-    """Why a source is not what was compiled; empty if it is."""
+    """Return why a source is not as it was compiled; empty if it is."""
     try:
         with open(os.path.join(package, file), "rb") as source:
             content = source.read()
@@ -210,7 +208,7 @@ def _changed(package: str, file: str, digest: str) -> str:
 
 
 def _differing(module: str, binary: int, offered: int) -> str:
-    """Why machine code cannot call a module's C interface, of which it needs this version; empty if it can."""
+    """Return why machine code cannot call a module's C interface, of which it needs this version; empty if it can."""
     import ctypes
 
     try:

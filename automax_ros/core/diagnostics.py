@@ -1,4 +1,4 @@
-"""Diagnostics: what is wrong, where, and what to do about it, for sources and configurations alike."""
+"""Diagnostics: an error, its place and its remedy, for sources and configurations alike."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Note:
-    """A second place that a diagnostic talks about, such as an earlier declaration."""
+    """A second place of a diagnostic, such as an earlier declaration."""
 
     message: str
     span: Span
@@ -38,7 +38,7 @@ class Note:
 class Diagnostic:
     """One finding. Its severity comes from the table of problems, never from the place that reports it.
 
-    ``statement`` is the BASIC line number where the fault lies, None where there is none.
+    ``statement`` is the BASIC line number of the fault, None if there is none.
     """
 
     code: str
@@ -57,7 +57,7 @@ class Diagnostic:
 
 @dataclass(frozen=True)
 class SourceText:
-    """A text with the name that messages call it by."""
+    """A text with its name in messages."""
 
     name: str
     text: str
@@ -69,7 +69,7 @@ class SourceText:
 
 
 def render(diagnostic: Diagnostic, source: SourceText) -> str:
-    """Return a diagnostic as the person reads it: place, message, source line, caret, notes and hint."""
+    """Return a diagnostic as readable text: place, message, source line, caret, notes and hint."""
     lines = source.lines
     parts = [
         f"{_place(source, diagnostic.span)}: {diagnostic.severity.value}[{diagnostic.code}]: {diagnostic.message}",

@@ -1,4 +1,4 @@
-"""What a person can mend, as exceptions that say what is wrong, where, and what to do."""
+"""Errors that the user can correct, as exceptions with the error, its place and its remedy."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from automax_ros.core.text import printable
 
 
 class UserError(Exception):
-    """Something that the person who uses the emulator can mend.
+    """An error that the user of the emulator can correct.
 
-    ``message`` is the sentence alone, ``hint`` what to do about it, ``code`` the problem's code (AMXnnnn, "" where it
-    has none) and ``place`` the file, with its line where it has lines. ``str()`` gives all of it, as it is printed.
+    ``message`` is the sentence alone, ``hint`` the remedy, ``code`` the problem's code (AMXnnnn, "" if it has none) and
+    ``place`` the file, with its line if it has lines. ``str()`` gives all of it, as it is printed.
     """
 
     def __init__(self, message: str, hint: str | None = None, *, code: str = "", place: str = "") -> None:

@@ -1,8 +1,8 @@
-"""Pieces of JSON Schema (draft 2020-12) that say what a YAML file may hold, for editors that know nothing else of it.
+"""Pieces of JSON Schema (draft 2020-12) for the form of YAML files, for editors that know nothing else of them.
 
-A plain value is judged as YAML 1.2 reads it: ``57552`` is a number, ``on`` a text. So a schema here takes every
-spelling that the reader takes, and refuses what the reader refuses by its form; what depends on other parts of the
-file is the reader's alone (decision).
+A plain value is judged as YAML 1.2 reads it: ``57552`` is a number, ``on`` a text. So a schema here accepts every
+spelling that the reader accepts, and refuses what the reader refuses by its form; rules that depend on other parts of
+the file are checked only by the reader (decision).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping
 from typing import Any, TypeAlias
 
 Schema: TypeAlias = Mapping[str, Any]
-"""A schema as data that JSON keeps."""
+"""A schema as data for JSON."""
 Keys: TypeAlias = Mapping[str, Schema]
 """The keys of a section, each with the schema of its value."""
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -60,7 +60,7 @@ def words(text: str, known: Collection[object], default: object = None) -> Schem
 
 
 def flag(text: str, default: bool | None = None) -> Schema:
-    """Return the schema of true or false, in each spelling that the rack's own files take."""
+    """Return the schema of true or false, in each spelling that the rack's own files accept."""
     spellings = ["on", "off", "On", "Off", "ON", "OFF", 1, 0]
     return {"description": text, "anyOf": [{"type": "boolean"}, {"enum": spellings}], **_usual(default)}
 
@@ -87,12 +87,12 @@ def listed(text: str, item: Schema, least: int = 0, most: int | None = None) -> 
 
 
 def either(text: str, *choices: Schema) -> Schema:
-    """Return the schema of a value that one of several schemas fits."""
+    """Return the schema of a value that matches one of several schemas."""
     return {"description": text, "anyOf": list(choices)}
 
 
 def may_be_empty(schema: Schema) -> Schema:
-    """Return a schema that takes nothing too: a key without a value has none of its options."""
+    """Return a schema that also accepts null: a key without a value has none of its options."""
     return {"description": schema["description"], "anyOf": [schema, {"type": "null"}]}
 
 

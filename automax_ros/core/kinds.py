@@ -1,4 +1,4 @@
-"""Enumerations whose numbers stand in messages and recordings: those of the constants in msg_defs/."""
+"""Enumerations whose numbers are in messages and recordings: those of the constants in msg_defs/."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import enum
 
 
 class WriteKind(enum.IntEnum):
-    """How a value came into common memory: ``CommonWrite.kind``.
+    """How a value was written to common memory: ``CommonWrite.kind``.
 
-    FORCE and RELEASE are entries of the write log too: they tell from when to when a view is held.
+    FORCE and RELEASE are entries of the write log too: they are the start and end of a force.
     """
 
     COMMIT = 1
@@ -19,7 +19,7 @@ class WriteKind(enum.IntEnum):
 
 
 class WriterKind(enum.IntEnum):
-    """Who writes common memory: ``Writer.kind``."""
+    """The kind of a writer of common memory: ``Writer.kind``."""
 
     TASK = 1
     ROS = 2
@@ -31,7 +31,7 @@ class WriterKind(enum.IntEnum):
 
 
 class Direction(enum.IntEnum):
-    """What ROS 2 sees of a common variable, and may do with it: ``Variable.direction``."""
+    """Access of ROS 2 to a common variable: ``Variable.direction``."""
 
     CLOSED = 0
     OUT = 1

@@ -1,4 +1,4 @@
-"""What tells the compiler of ``tools/build_compiled.py`` more of a class than Python needs to know."""
+"""Attributes of classes for the compiler of ``tools/build_compiled.py``, which Python does not need."""
 
 from __future__ import annotations
 

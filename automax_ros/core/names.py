@@ -1,10 +1,8 @@
-"""Names of variables as people write them, with subscripts: which variable, and which element of an array, they mean.
+"""Names of variables with subscripts: the variable and the array's element that a text means.
 
-``REF%``, ``TABLE%(3)``, ``grid[1, 2]``: case and blanks do not matter, square brackets are round ones (decision).
-An array's elements are counted with the last subscript fastest, from 0 on. The registers of the module in slot 5 are
-the array ``SLOT:5%``, a name that no task can declare (decision).
-
-Texts ``NAME=VALUE`` against the variables of a task or of a rack.
+``REF%``, ``TABLE%(3)``, ``grid[1, 2]``: case and blanks do not matter, square brackets are round ones (decision). An
+array's elements are counted with the last subscript fastest, from 0 on. The registers of the module in slot 5 are the
+array ``SLOT:5%``, a name that no task can declare (decision). Texts ``NAME=VALUE`` are read here too.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import value_of, wanted
 
 AUTO_RUN = "AUTORUNSTATUS@"
-"""TRUE where AUTO RUN is enabled for the rack (2.4.6)."""
+"""TRUE if AUTO RUN is enabled for the rack (2.4.6)."""
 PREDEFINED = (AUTO_RUN, "FORCINGSTATUS@", *(f"BATTERYSTATUS{slot}@" for slot in range(5)))
 """Commons that the rack itself writes (2.4.6)."""
 
@@ -77,8 +75,8 @@ class Element(Generic[V]):
 def element(asked: str, variables: Mapping[str, V], absent: str) -> Element[V]:
     """Return the simple variable or the array's element that a text names.
 
-    ``variables`` are known by their full names; ``absent`` begins the message where none of them is meant, such as
-    ``the rack has no common variable``.
+    ``variables`` are by their full names; ``absent`` begins the message if the text names none of them, such as ``the
+    rack has no common variable``.
 
     Raises:
         UnknownName: no such variable.
@@ -118,7 +116,7 @@ def element_name(variable: Shaped, index: int) -> str:
 
 
 def last_element_name(variable: Shaped) -> str:
-    """Return the name of an array's last element, which shows how large the array is."""
+    """Return the name of an array's last element, which shows the size of the array."""
     return f"{variable.name}({','.join(str(size - 1) for size in variable.dimensions)})"
 
 
@@ -155,7 +153,7 @@ def setting(text: str, variables: Mapping[str, W], absent: str) -> tuple[Element
     """Return the variable or array element that ``NAME=VALUE`` sets, and the value as it would hold it.
 
     Raises:
-        Fault: not of that form, no such variable or element (``element``), or the value is none of its type.
+        UserError: not of that form, no such variable or element (``element``), or the value is not of its type.
     """
     name, equals, given = text.partition("=")
     if not equals:

@@ -1,6 +1,6 @@
 """Arithmetic of the rack: 16 and 32 bit integers, REAL with a 24-bit mantissa.
 
-Everything here is built from + - * /, comparisons and integers, so that it gives the same bits on every machine.
+All of it uses only + - * /, comparisons and integers, so that it gives the same bits on every machine.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 REAL_LIMIT = 9.2233717e18
 """Largest magnitude of a REAL (2.4.2)."""
 REAL_MAX: float = struct.unpack("<f", struct.pack("<f", REAL_LIMIT))[0]
-"""What a REAL variable holds of it: the nearest single-precision value, which is a little smaller."""
+"""Largest value of a REAL variable: the single-precision value nearest to it, which is a little smaller."""
 REAL_MIN_POSITIVE = 5.4210107e-20
 REAL_MIN_NEGATIVE = 2.7105054e-20
 """Smallest magnitude of a negative REAL (2.4.2); below it a value becomes 0 (decision)."""
@@ -49,7 +49,7 @@ def sign_extended(value: int, bits: int) -> int:
 
 
 def stored_real(value: float) -> tuple[float, bool]:
-    """Return what a REAL variable holds after it was given ``value``, and whether it had to be clamped.
+    """Return the value of a REAL variable after it was given ``value``, and whether it had to be clamped.
 
     The nearest single-precision value; clamped at +-9.2233717E18; 0 below the smallest magnitude (decision).
     """

@@ -1,4 +1,4 @@
-"""Writes a file so that a crash at any instant leaves the old one or the new one, whole."""
+"""Writes a file atomically: a crash at any instant leaves the old one or the new one, whole."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Put a whole file in the place of another, down to the disk: whoever reads it gets one or the other.
+    """Replace a file by a new one on the disk; a reader gets one or the other, whole.
 
-    The data is on the disk before the name leads to it, and the name before this returns. A crash may leave a
-    temporary file next to it, whose name begins with a point.
+    The data is on the disk before the name leads to it, and the name before this returns. A crash may leave a temporary
+    file next to it, whose name begins with a point.
 
     Raises:
-        OSError: it cannot be written; what was there stays.
+        OSError: it cannot be written; the old file stays.
     """
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
@@ -32,7 +32,7 @@ def replace_file(path: Path, data: bytes) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Let a folder's entries reach the disk, where the file system can do that for folders."""
+    """Flush a folder's entries to the disk, if the file system can do that for folders."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         with contextlib.suppress(OSError):

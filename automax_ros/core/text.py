@@ -1,4 +1,4 @@
-"""Pieces of text for messages: untrusted text made harmless, counted things, the known word nearest to another."""
+"""Text for messages: escapes untrusted text, counts things, finds the known word nearest to another."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ MAX_COMPARISONS = 50_000
 """Most pairs of words that one ``Suggester`` compares (decision: a bound on time for hostile sources)."""
 _LONGEST_GUESS = 60
 _LISTED = 8
-"""How many words a hint lists where none is near."""
+"""Most words that a hint lists if none is near."""
 _LIKENESS = 0.62
 """Share of letters in common from which a word counts as a misspelling (decision)."""
 
 
 def printable(text: str) -> str:
-    """Return a text with control characters but the tab replaced, so that a hostile source cannot drive a terminal.
+    """Return a text with control characters but the tab replaced, so that a hostile source cannot control a terminal.
 
-    Line ends, C0, DEL, C1, bidirectional controls and what else Python does not count as printable.
+    These are line ends, C0, DEL, C1, bidirectional controls and all others that Python does not count as printable.
     """
     if text.isprintable():
         return text
@@ -46,7 +46,7 @@ def count_of(number: int, thing: str) -> str:
 
 
 def table(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> list[str]:
-    """Return rows as lines with aligned columns, those numbered in ``right`` (from 0) at their ends.
+    """Return rows as lines with aligned columns, those numbered in ``right`` (from 0) aligned at the right.
 
     A row may have fewer cells than others.
     """
@@ -61,7 +61,7 @@ def table(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> list[str
 
 
 def did_you_mean(word: str, known: Iterable[str], *, most: int = 1) -> str | None:
-    """Return the hint ``did you mean X?`` with the known words nearest to one that is not known, None if none is near.
+    """Return the hint ``did you mean X?`` with the known words nearest to an unknown one, None if none is near.
 
     At most ``most`` words, ``X or Y``.
     """
@@ -69,7 +69,7 @@ def did_you_mean(word: str, known: Iterable[str], *, most: int = 1) -> str | Non
 
 
 def near_or_listed(word: str, known: Collection[str], prefix: str = "") -> str | None:
-    """Return ``did_you_mean``, or a hint with the first known words where none is near; None if there are none.
+    """Return ``did_you_mean``, or a hint with the first known words if none is near; None if there are none.
 
     ``prefix`` belongs before the word that is meant.
     """
@@ -80,23 +80,23 @@ def near_or_listed(word: str, known: Collection[str], prefix: str = "") -> str |
 
 
 class Suggester:
-    """Finds near words until its budget of comparisons is spent."""
+    """Finds near words until its budget of comparisons is used up."""
 
     def __init__(self) -> None:
-        """Begin with the whole budget."""
+        """Create with the whole budget."""
         self._left = MAX_COMPARISONS
 
     def hint(self, word: str, known: Iterable[str], *, most: int = 1) -> str | None:
-        """Return the hint ``did you mean X?``, None where no known word is near or the budget is spent."""
+        """Return the hint ``did you mean X?``, None if no known word is near or the budget is used up."""
         found = self._near(word, known, most)
         return f"did you mean {' or '.join(found)}?" if found else None
 
     def nearest(self, word: str, known: Iterable[str]) -> str | None:
-        """Return the known word that looks most like ``word``, None where none is near or the budget is spent."""
+        """Return the known word most similar to ``word``, None if none is near or the budget is used up."""
         return next(iter(self._near(word, known, 1)), None)
 
     def _near(self, word: str, known: Iterable[str], most: int) -> list[str]:
-        """Return near words in any case: twins of another type character first, then by letters in common."""
+        """Return near words in any case: the same name with another type character first, then by letters in common."""
         if len(word) > _LONGEST_GUESS:
             return []
         words = list(known)

@@ -1,4 +1,4 @@
-"""Integer time: every instant and period below ``nodes/`` is a whole number of nanoseconds."""
+"""Integer time: every instant and period outside of ``ros/`` is a whole number of nanoseconds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TICK_STEP_NS = NS_PER_MS // 2
 MIN_TICK_NS = NS_PER_MS // 2
 MAX_TICK_NS = 10 * NS_PER_MS
 DEFAULT_TICK_NS = 5_500_000
-"""Tick of a Processor unless the rack says otherwise (section 4)."""
+"""Tick of a Processor unless the rack file sets another (section 4)."""
 MOST_SECONDS = 1_000_000_000
 """Longest time in a file (decision: 31 years, far from the 63 bits of a count of ns)."""
 UDC_TICK_NS = NS_PER_MS // 2
@@ -75,7 +75,7 @@ def seconds_text(time_ns: int) -> str:
 
 
 def _exact(number: float | str, what: str) -> Fraction:
-    """Return a number as it is written; a huge exponent is refused before it takes memory."""
+    """Return a number exactly as written; a huge exponent is refused before it uses memory."""
     text = str(number).strip()
     if not is_number(text):
         raise ValueError(f"{what} {quoted(text)} is not a number")

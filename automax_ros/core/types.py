@@ -67,10 +67,10 @@ class DataType(enum.Enum):
 
     @classmethod
     def numbered(cls, number: int) -> DataType:
-        """Return the type of a number in a message.
+        """Return the type with a number in a message.
 
         Raises:
-            ValueError: no type has it.
+            ValueError: no type has the number.
         """
         for kind, known in _NUMBERS.items():
             if known == number:
@@ -109,7 +109,7 @@ _BY_SUFFIX = {kind.value: kind for kind in DataType if kind.value}
 
 
 def type_of_name(name: str) -> DataType:
-    """Return the data type that the last character of a variable's full name tells."""
+    """Return the data type for the last character of a variable's full name."""
     return _BY_SUFFIX.get(name[-1:], DataType.REAL)
 
 
@@ -119,7 +119,7 @@ def bare_name(name: str) -> str:
 
 
 def declaration_text(name: str, dimensions: Sequence[int] = (), length: int = 0) -> str:
-    """Return a variable as COMMON and rack files declare it: ``TABLE%(10)``, ``NOTE$:8(3)``.
+    """Return a variable's declaration as in COMMON and rack files: ``TABLE%(10)``, ``NOTE$:8(3)``.
 
     ``dimensions`` are numbers of elements, ``length`` is a STRING's, 0 for other types.
     """
@@ -132,7 +132,7 @@ _DOUBLE = struct.Struct("<d")
 
 
 def same_bits(one: Value, other: Value) -> bool:
-    """Whether two values are the same to the last bit: -0.0 is not 0.0, and NaN is NaN."""
+    """Return whether two values are the same to the last bit: -0.0 is not 0.0, and NaN is NaN."""
     if isinstance(one, float) and isinstance(other, float):
         return (one == other and one != 0.0) or _DOUBLE.pack(one) == _DOUBLE.pack(other)
     return one == other and type(one) is type(other)

@@ -1,12 +1,12 @@
-"""Values as people write and read them: one spelling per data type, wherever a text becomes a value or a value a text.
+"""Reads and writes values as text: one spelling per data type everywhere.
 
 Command lines, CSV tables and presets follow one rule (decision):
 
-- digits are 0 to 9, without underscores; a sign may stand before them;
+- digits are 0 to 9, without underscores; a sign may precede them;
 - an INTEGER or DOUBLE INTEGER is a whole number of its range, also as spreadsheets write one: ``100.0``;
 - a REAL is any decimal number, ``100``, ``100.0`` or ``1E3``, within the range of 2.4.2; one that is too small is 0;
 - a BOOLEAN is TRUE, FALSE, ON or OFF in any case, or 1 or 0;
-- a STRING is the text as it stands, up to the variable's length.
+- a STRING is the unchanged text, up to the variable's length.
 
 Blanks around a number or a boolean do not matter.
 """
@@ -26,14 +26,14 @@ _DECIMAL = re.compile(r"[-+]?(?:[0-9]{1,60}(?:\.[0-9]{0,60})?|\.[0-9]{1,60})(?:[
 _TRUTH = {"TRUE": True, "ON": True, "FALSE": False, "OFF": False}
 _SINGLE = struct.Struct("<f")
 _FEWEST, _MOST = 6, 9
-"""Any decimal with 6 digits survives a single, 9 tell any two singles apart (IEEE 754)."""
+"""A single keeps any decimal with 6 digits, and 9 digits distinguish any two singles (IEEE 754)."""
 
 
 def number(text: str) -> float:
-    """Return the decimal number that a text writes.
+    """Return the decimal number in a text.
 
     Raises:
-        ValueError: it writes none, or one that no computer holds.
+        ValueError: the text is not a number, or it is beyond the range of a double.
     """
     if not is_number(text):
         raise ValueError(f"{quoted(text)} is not a number")
@@ -44,10 +44,10 @@ def number(text: str) -> float:
 
 
 def whole_number(text: str) -> int:
-    """Return the whole number that a text writes, such as ``100``, ``-3`` or ``100.0``.
+    """Return the whole number in a text, such as ``100``, ``-3`` or ``100.0``.
 
     Raises:
-        ValueError: it writes none.
+        ValueError: the text is not a whole number.
     """
     match = _WHOLE.fullmatch(text.strip())
     if match is None:
@@ -56,14 +56,14 @@ def whole_number(text: str) -> int:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text writes a decimal number of reasonable length."""
+    """Return whether a text is a decimal number of reasonable length."""
     return _DECIMAL.fullmatch(text.strip()) is not None
 
 
 def value_of(text: str, kind: DataType, length: int = MAX_STRING_LENGTH) -> Value | None:
-    """Return the value of a type that a text writes, as a variable would hold it; None if it writes none.
+    """Return the value of a type in a text, as a variable would hold it; None if the text is not such a value.
 
-    ``length`` is the most characters that a STRING holds.
+    ``length`` is the most characters of a STRING.
     """
     if kind is DataType.STRING:
         return text if len(text) <= length and _can_be_sent(text) else None
@@ -82,7 +82,7 @@ def value_of(text: str, kind: DataType, length: int = MAX_STRING_LENGTH) -> Valu
 
 
 def wanted(kind: DataType, length: int = MAX_STRING_LENGTH) -> str:
-    """Return in words what ``value_of`` takes: ``a whole number from -32768 to 32767``."""
+    """Return in words what ``value_of`` accepts: ``a whole number from -32768 to 32767``."""
     if kind is DataType.STRING:
         return f"a text of at most {length} characters"
     if kind is DataType.BOOLEAN:
@@ -97,14 +97,14 @@ def range_text(kind: DataType) -> str:
 
 
 def value_text(value: Value) -> str:
-    """Return a value as tables and status lines show it: booleans 1 and 0, REALs with no more digits than they have."""
+    """Return a value as in tables and status lines: booleans 1 and 0, REALs with no more digits than they have."""
     if isinstance(value, bool):
         return "1" if value else "0"
     return real_text(value) if isinstance(value, float) else str(value)
 
 
 def source_text(value: Value) -> str:
-    """Return a value as a task's source writes it: TRUE and FALSE, strings in quotes."""
+    """Return a value as in a task's source: TRUE and FALSE, strings in quotes."""
     if isinstance(value, bool):
         return "TRUE" if value else "FALSE"
     return f'"{printable(value)}"' if isinstance(value, str) else value_text(value)
@@ -113,7 +113,7 @@ def source_text(value: Value) -> str:
 def real_text(value: float) -> str:
     """Return the shortest text that gives the same single-precision value, as Python writes it: ``0.1``, ``2.0``.
 
-    A number that is not a single is written as it is.
+    A number that is not a single is written in full.
     """
     for digits in range(_FEWEST, _MOST + 1):
         candidate = float(f"{value:.{digits}g}")
@@ -126,7 +126,7 @@ def real_text(value: float) -> str:
 
 
 def _can_be_sent(text: str) -> bool:
-    """Whether a text can be encoded; what a terminal gave that is not UTF-8 cannot."""
+    """Return whether a text can be encoded; input from a terminal that is not UTF-8 cannot."""
     try:
         text.encode()
     except UnicodeEncodeError:

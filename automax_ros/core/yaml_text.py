@@ -1,10 +1,9 @@
-"""YAML with nothing in it that can do harm: mappings, lists and single values with their places.
+"""Reads and writes YAML safely: mappings, lists and single values with their places.
 
 A text is read event by event with PyYAML's parser, never constructed: no tag makes an object, no alias multiplies,
-nesting and size are bounded, and a key such as ``NO`` or a model such as ``57E413`` stays the text that it is. Rack
-files are read so for their places, which PyYAML does not give with its data, descriptions of recordings for the bounds.
-
-Writes a YAML tree as text again, so that ``read_yaml`` gives the same tree apart from places; remarks are lost.
+nesting and size are bounded, and a key such as ``NO`` or a model such as ``57E413`` stays a text. Rack files are read
+this way for their places, which PyYAML does not give with its data, descriptions of recordings for the bounds. A tree
+that is written as text again is read by ``read_yaml`` as the same tree apart from places; remarks are lost.
 """
 
 from __future__ import annotations
@@ -29,14 +28,14 @@ MAX_NODES = 100_000
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """libyaml parses a megabyte in 0.7 s, PyYAML without it in 12 s."""
 _TOO_DEEP = "maximum nesting depth"
-"""What newer versions of libyaml say of a text that is nested too deep for them."""
+"""The error of newer versions of libyaml for a text that is nested too deep for them."""
 _WHOLE = re.compile(r"-?(0|[1-9][0-9]{0,17})")
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _TRUTH = {"true": True, "false": False}
 
 
 class Flaw(enum.Enum):
-    """What can be wrong with a text."""
+    """Kinds of errors in a text."""
 
     SYNTAX = "it is not YAML"
     EXTRA = "a part of YAML that is not read"
@@ -44,7 +43,7 @@ class Flaw(enum.Enum):
 
 
 Report = Callable[[Flaw, str, Span, str | None], None]
-"""Takes what is wrong: its kind, a message, the place, and a hint or None."""
+"""Called with an error: its kind, a message, the place, and a hint or None."""
 
 
 class YamlFault(UserError):
@@ -57,7 +56,7 @@ class YamlFault(UserError):
 
 @dataclass(frozen=True)
 class Scalar:
-    """A single value. ``plain`` is FALSE where it stands in quotes or in a block of text."""
+    """A single value. ``plain`` is FALSE if it is in quotes or in a block of text."""
 
     text: str
     plain: bool
@@ -65,7 +64,7 @@ class Scalar:
 
     @property
     def is_null(self) -> bool:
-        """Whether nothing was given."""
+        """Whether no value was given."""
         return self.plain and self.text in ("", "~", "null", "Null", "NULL")
 
 
@@ -79,7 +78,7 @@ class Sequence:
 
 @dataclass(frozen=True)
 class Mapping:
-    """Keys and values in the order of the file; a key may be there twice."""
+    """Keys and values in the order of the file; a key may occur twice."""
 
     entries: tuple[tuple[Scalar, Node], ...]
     span: Span
@@ -89,7 +88,7 @@ Node: TypeAlias = "Scalar | Sequence | Mapping"
 
 
 class _TooMuch(Exception):
-    """The text is nested too deep or has too many values; reading cannot go on."""
+    """The text is nested too deep or has too many values; reading cannot continue."""
 
 
 def read_yaml(
@@ -97,15 +96,15 @@ def read_yaml(
 ) -> Node | None:
     """Return the tree of a text, None if it could not be read to its end; ``what`` names the kind of text in messages.
 
-    An alias is reported and read as nothing; anchors and tags are reported and read as if they were not there.
+    An alias is reported and read as null; anchors and tags are reported and ignored.
     """
     return _Reader(text, report, what, depth, nodes).read()
 
 
 def read_data(text: str, *, typed: bool = False, depth: int = MAX_DEPTH, nodes: int = MAX_NODES) -> Any:
-    """Return a text's data as dicts, lists and texts; of a key that stands twice the last counts.
+    """Return a text's data as dicts, lists and texts; of a repeated key the last counts.
 
-    ``typed``: whole numbers, true and false without quotes become what they say.
+    ``typed``: whole numbers, true and false without quotes become numbers and booleans.
 
     Raises:
         YamlFault: it is not YAML, has aliases, anchors or tags, or is too large.
@@ -129,14 +128,14 @@ def _data(node: Node, typed: bool) -> Any:
 
 
 class _Places:
-    """Turns PyYAML's marks into spans: PyYAML also ends lines at characters that editors do not count."""
+    """Converts PyYAML's marks to spans: PyYAML also ends lines at characters that editors do not count."""
 
     def __init__(self, text: str) -> None:
         self._length = len(text)
         self._starts = [0, *(end.end() for end in _LINE_END.finditer(text))]
 
     def span(self, start: int, end: int) -> Span:
-        """Return the span between two indices, cut off at the end of its first line."""
+        """Return the span between two indices, truncated at the end of its first line."""
         start = min(start, self._length)
         line = bisect_right(self._starts, start)
         begin = self._starts[line - 1]
@@ -177,7 +176,7 @@ class _Reader:
     def _syntax_error(self, error: yaml.MarkedYAMLError) -> None:
         mark = error.problem_mark or error.context_mark
         span = self._places.span(mark.index, mark.index + 1) if mark else Span(1, 1, 2)
-        if _TOO_DEEP in (error.problem or ""):  # its scanner looks ahead of what is read here
+        if _TOO_DEEP in (error.problem or ""):  # its scanner reads ahead
             self._report(Flaw.SIZE, f"nested deeper than {self._depth} levels", span, None)
             return
         message = quoted(error.problem or "not YAML", marks="", limit=120)
@@ -218,7 +217,7 @@ class _Reader:
         return Scalar("", True, self._span(event))
 
     def _refuse_extras(self, event: yaml.Event) -> None:
-        """Report an alias, which is read as nothing, and anchors and tags, which are read as if they were not there."""
+        """Report an alias, which is read as null, and anchors and tags, which are ignored."""
         anchor, tag = getattr(event, "anchor", None), getattr(event, "tag", None)
         if isinstance(event, yaml.AliasEvent):
             self._refuse(f"the alias {quoted(f'*{anchor}')}", event, "write the value again")

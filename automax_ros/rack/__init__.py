@@ -1,1 +1,1 @@
-"""A rack that runs: modules, common memory, tasks and their schedule. No ROS here."""
+"""A running rack: modules, common memory, tasks and their schedule. Independent of ROS 2."""

@@ -50,11 +50,11 @@ from automax_ros.runtime.time.scheduler import Scheduler
 
 
 class Rack:
-    """A rack that runs. ``stopwatch`` (ns, the pacer's clock) measures execution times; without one they count as 0.
+    """A running rack. ``stopwatch`` (ns, the pacer's clock) measures execution times; without one they count as 0.
 
-    ``execution`` executes the scans of all modules in place of what the configuration says (``rack/stepping``).
-    ``local`` are the slots whose modules are in this process (``rack/base/part``), all if None. ``installation`` are
-    the tasks where they are compiled already; ``native`` says which of them scan as machine code (``compile/native``).
+    ``execution`` replaces the configured execution of scans in all modules (``scenario/stepping``). ``local`` are the
+    slots whose modules are in this process (``rack/base/part``), all if None. ``installation`` has the tasks if they
+    are compiled already; ``native`` selects which of them scan as machine code (``compile/native``).
     """
 
     def __init__(
@@ -139,7 +139,7 @@ class Rack:
 
     @property
     def warnings(self) -> list[Finding]:
-        """What the checks of the tasks found, short of errors."""
+        """Warnings from the checks of the tasks."""
         return self.operations.installation.warnings
 
     @property
@@ -164,7 +164,7 @@ class Rack:
 
     @property
     def stop_reason(self) -> str | None:
-        """What stopped all tasks, None while the rack runs."""
+        """Why all tasks are stopped; None while the rack runs."""
         return self.operations.stop_reason
 
     @property
@@ -174,7 +174,7 @@ class Rack:
 
     @property
     def clock_since_ns(self) -> int | None:
-        """Since when the common clock of the backplane runs, None while it does not."""
+        """Since when the common clock of the backplane runs; None while it does not."""
         return self._clock.since_ns
 
     @property
@@ -184,16 +184,16 @@ class Rack:
 
     @property
     def installed(self) -> int:
-        """A number of 63 bits for what is installed: the rack's file and all sources, those of other processes too."""
+        """A number of 63 bits that the rack's file and all sources determine, those of other processes too."""
         return digest_of(self.config.text, self.operations.installation.sources)
 
     @property
     def fingerprint(self) -> int:
-        """A number of 63 bits that configuration and sources determine: the run's id where no other is given."""
+        """A number of 63 bits that configuration and sources determine: the run's id unless another is given."""
         return digest_of(self.config.text, self.sources)
 
     def observe(self, observer: RackObserver) -> None:
-        """Tell an observer everything from now on; records and the write log are kept from then on."""
+        """Notify an observer from now on; keep scan records and the write log from now on too."""
         self.observers.add(observer)
         for task in self.tasks:
             task.record_scans()
@@ -201,10 +201,10 @@ class Rack:
     def start(self, settings: Sequence[tuple[str, Value]] = (), first: Callable[[], None] | None = None) -> None:
         """Write presets, then ``settings`` (name and value, as an operator would), and put all tasks into RUN.
 
-        A name may be that of an array's element: ``TABLE%(3)``. ``first`` is called before what stands before SCAN_LOOP
-        runs: it may write and operate the rack, as the stimuli of time 0 do.
+        A name may be that of an array's element: ``TABLE%(3)``. ``first`` is called before the start-up parts run: it
+        may write and operate the rack, as the stimuli of time 0 do.
 
-        Scans begin at once: the first of each task at this instant, then each period.
+        Scans start at once: the first of each task at this instant, then one each period.
 
         Raises:
             NameFault: a setting names a variable that the rack does not have.
@@ -218,9 +218,9 @@ class Rack:
         self._begin_plants()
 
     def join(self, now_ns: int, catch_up: Callable[[], None]) -> None:
-        """Take part in a rack that others run already: the first scans come at the next ticks.
+        """Join a rack that other processes run already: the first scans come at the next ticks.
 
-        ``catch_up`` takes over what they hold, after the presets and before the tasks are put into RUN.
+        ``catch_up`` applies the values of the other processes, after the presets and before the tasks are put into RUN.
         """
         self.scheduler.run_due(now_ns)
         self.memory.now_ns = self.now_ns
@@ -243,7 +243,7 @@ class Rack:
         self.observers.tell_writes()
 
     def run(self, seconds: float) -> None:
-        """Let simulated time pass."""
+        """Advance simulated time."""
         self.scheduler.run_until(self.now_ns + seconds_ns(seconds))
 
     def write(self, name: str, value: Value, writer: int = OPERATOR_WRITER, element: int = 0) -> None:
@@ -297,7 +297,7 @@ class Rack:
             self.observers.tuned(self._forcing.local(name).task, self.now_ns)
 
     def forces(self) -> list[Force]:
-        """Return the force table: what is forced and at which value, in the order of the rack file."""
+        """Return the force table: variables and the values they are held at, in the order of the rack file."""
         return self._forcing.table()
 
     def tune(self, task: Task, name: str, value: object) -> None:
@@ -330,7 +330,7 @@ class Rack:
         raise KeyError(name)
 
     def state(self) -> RackState:
-        """Return all that the future depends on, between two scans."""
+        """Return all state on which the future depends, between two scans."""
         return RackState(
             now_ns=self.now_ns,
             image=tuple(self.memory.image()),
@@ -345,7 +345,7 @@ class Rack:
         )
 
     def load(self, state: RackState) -> None:
-        """Go on from a state of the same rack, in place of ``start``; what happens from now on is the same bit for bit.
+        """Continue from a state of the same rack, in place of ``start``; all that follows is the same bit for bit.
 
         Raises:
             ValueError: the state is not one of this rack, or this rack has been started already.
@@ -386,5 +386,5 @@ class Rack:
 
 
 def scans_per_second(rack: Rack) -> float:
-    """Return how many scans the rack's tasks execute in a second of rack time."""
+    """Return how many scans the rack's tasks execute per second of rack time."""
     return sum(NS_PER_S / task.period_ns for task in rack.tasks if task.period_ns)

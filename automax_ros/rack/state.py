@@ -1,7 +1,4 @@
-"""A number for what a rack runs.
-
-What a rack's future depends on.
-"""
+"""State of a rack, and a number for its file and sources."""
 
 from __future__ import annotations
 
@@ -19,11 +16,11 @@ from automax_ros.rack.modules.module import ModuleState
 
 @dataclass(frozen=True)
 class RackState:
-    """All that the future of a rack depends on, apart from its configuration and sources.
+    """All state on which the future of a rack depends, apart from its configuration and sources.
 
-    ``image`` is (view, element, value) of all of memory, ``forced`` what is held, ``events`` those that are kept
-    for the next who waits, ``clock_since_ns`` since when the common clock runs, ``modules`` by slot, ``plants`` by
-    name: a module's state has nothing of its plant. ``under_forces`` is what ``forced`` would hold without the forces.
+    ``image`` is (view, element, value) of all of memory, ``forced`` the forced elements, ``events`` those kept for the
+    next task that waits, ``clock_since_ns`` since when the common clock runs, ``modules`` by slot, ``plants`` by name:
+    a module's state excludes its plant. ``under_forces`` are the values of ``forced`` without the forces.
     """
 
     now_ns: int

@@ -1,1 +1,1 @@
-"""What a rack's YAML file says: read, checked, frozen. Nothing here runs."""
+"""The configuration of a rack from its YAML file: read, checked, frozen. Nothing here runs."""

@@ -1,4 +1,4 @@
-"""Reads a rack's YAML file into its configuration and finds everything that is wrong with it."""
+"""Reads a rack's YAML file into its configuration and reports all errors in it."""
 
 from __future__ import annotations
 
@@ -49,18 +49,18 @@ KEYS: Keys = {
     "common": COMMON_SCHEMA,
     "watch": WATCH_SCHEMA,
 }
-"""What a rack file may say at its top."""
+"""The top-level keys of a rack file."""
 _REQUIRED = ("rack", "slots")
 
 
 def schema() -> Schema:
-    """Return the JSON schema of a rack file, for editors: what its form can be wrong in, not how its parts agree."""
+    """Return the JSON schema of a rack file, for editors: it checks the form, not how the parts agree."""
     return document("AutoMax rack", section("A rack: its modules, tasks and common variables.", KEYS, _REQUIRED))
 
 
 @dataclass(frozen=True)
 class LoadResult:
-    """What came of a rack file: ``config`` is None if there are errors. ``source`` is what the diagnostics refer to."""
+    """Result of reading a rack file: ``config`` is None if there are errors. Diagnostics refer to ``source``."""
 
     config: RackConfig | None
     diagnostics: list[Diagnostic]
@@ -68,7 +68,7 @@ class LoadResult:
 
     @property
     def namespace(self) -> str | None:
-        """The rack's namespace, None where even its name cannot be made out.
+        """The rack's namespace, None if not even its name can be read.
 
         With errors elsewhere, in the YAML itself too, it is that of the first line ``rack: NAME`` (decision: so the
         rack has its place in the graph while the rest of the file is mended).
@@ -81,10 +81,10 @@ class LoadResult:
 
 
 def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
-    """Read a rack file; whatever it holds becomes a configuration or diagnostics (AMX6000 to AMX6499), by place.
+    """Read a rack file; any content becomes a configuration or diagnostics (AMX6000 to AMX6499), by place.
 
     Task sources must lie in the file's folder, symbolic links followed (also the file's own), unless ``allow_outside``.
-    They are read to see that they can be, not compiled.
+    They are read to check that they can be, not compiled.
     """
     path = Path(path)
     findings = ProblemList()
@@ -93,9 +93,9 @@ def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
 
 
 def load_stored(source: SourceText, path: Path) -> LoadResult:
-    """Read a rack file whose text stands in a recording, with its sources under the names of their tasks.
+    """Read a rack file from the text in a recording, with its sources under the names of their tasks.
 
-    ``path`` is what the configuration calls the file. No file is touched.
+    ``path`` is the file's path in the configuration. No file is read.
     """
     findings = ProblemList()
     return _loaded(source, TaskReader(None, False, findings), path, findings)
@@ -228,7 +228,7 @@ class _RackReader:
         return reader.read(node, section.key_span("slots")), reader.unread
 
     def _check_size(self, variables: tuple[CommonVariable, ...], modules: tuple[ModuleConfig, ...], span: Span) -> None:
-        """Compare the commons with the module that holds them, the first that can (J-3636 p. 1-1)."""
+        """Compare the size of the commons with the module that holds them, the first that can (J-3636 p. 1-1)."""
         holder = next((module for module in modules if module.common_registers), None)
         needed = sum(variable.registers for variable in variables if variable.point is None)
         if holder is not None and needed > holder.common_registers:

@@ -1,6 +1,6 @@
-"""The numbers of a plant by dotted path, as their keys stand in the rack file: ``UNWIND.load.torque_nm``.
+"""The numbers of a plant by dotted path, from their keys in the rack file: ``UNWIND.load.torque_nm``.
 
-A rack with other numbers is the rack of another text, so that every rule of the file applies to them.
+A rack with other numbers is read from another text, so that every rule of the file applies to them.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ class PlantNumber:
 
 
 def plant_number(config: RackConfig, text: str) -> PlantNumber:
-    """Return the number that ``PLANT.key.key`` means; the plant's name may be in lower case.
+    """Return the number with the path ``PLANT.key.key``; the plant's name may be in lower case.
 
     Raises:
-        Fault: there is no such plant, or its section has no such number.
+        UserError: there is no such plant, or its section has no such number.
     """
     owner, _, path = "".join(text.split()).partition(".")
     plants = {plant.name: plant for plant in config.plants}
@@ -57,10 +57,10 @@ def plant_number(config: RackConfig, text: str) -> PlantNumber:
 def with_numbers(text: str, values: Mapping[PlantNumber, str]) -> str:
     """Return a rack file's text with other numbers of plants, the text itself without any.
 
-    Keys that lead to them are made where the file lacks them; a motor that is a name is none that has numbers.
+    Missing keys on the way to them are added; a motor given by its name has no numbers.
 
     Raises:
-        Fault: something other than keys stands where keys lead through.
+        UserError: a key on the way to a number has something other than keys.
     """
     if not values:
         return text
@@ -72,7 +72,7 @@ def with_numbers(text: str, values: Mapping[PlantNumber, str]) -> str:
 
 
 def _numbers(schema: Schema, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Schema]]:
-    """Yield the numbers that keys of fixed names lead to."""
+    """Yield the numbers below keys with fixed names."""
     if "minimum" in schema:
         yield path, schema
     for choice in schema.get("anyOf", ()):
@@ -95,7 +95,7 @@ def _with(node: Node | None, keys: tuple[str, ...], value: str, label: str) -> K
 
 
 def _means(name: Scalar, keys: tuple[str, ...]) -> bool:
-    """Whether a key of the file is the first of ``keys``; names of plants are in upper case once they are read."""
+    """Return whether a key of the file is the first of ``keys``; names of plants may be in lower case in the file."""
     return name.text == keys[0] or name.text.upper() == keys[0]
 
 

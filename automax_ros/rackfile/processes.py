@@ -1,10 +1,8 @@
-"""How a process of a distributed rack is called: as its first module.
+"""The processes of a distributed rack: which modules need their own process, and which must share one.
 
-Which modules of a rack need a process of their own, and which must share one, when a rack runs distributed.
-
-What modules exchange through registers and common variables crosses from process to process. What does not may not be
-cut: modules share a process where one acts on another at an instant of rack time, and only there (decision). So these
-share one:
+Exchange through registers and common variables crosses from process to process. Anything else must stay in one process:
+modules share a process where one acts on another at an instant of rack time, and only there (decision). So these share
+one:
 
 - a Processor, the 57C406 whose gates one of its tasks fires, and the drive digital I/O module of that drive (52.1.1);
 - a 57C405 and the 57C406 whose armature voltage is wired to it (52.6.1);
@@ -13,8 +11,10 @@ share one:
 - the modules of tasks that declare one software event, or that open one channel (J-3675 p. 6-17, 6-20).
 
 The common clock joins none of them (decision): which module drives it is a bit of a register, and each process follows
-that bit on its own image. Neither do plants that feed commons, nor forces, STOP ALL or power: they cross as
-writes and orders.
+that bit on its own image. Neither do plants that feed commons, nor forces, STOP ALL or power: they cross as writes and
+orders.
+
+A process is named after its first module.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from automax_ros.rackfile.model.driven import driven_plants
 from automax_ros.rackfile.model.module import ModuleConfig
 
 HOME = "common_memory"
-"""The name of the seat of common memory, as that of its node, also where a lone Processor holds the commons."""
+"""Name of the process with common memory, as that of its node, also if a lone Processor holds the commons."""
 _LOOP_SLOTS = {"io_cntl_slot": "fires the gates of", "dig_io_slot": "reads the permissive of"}
-"""The inputs of a current minor loop that name modules, with what its task does there."""
+"""The inputs of a current minor loop that name modules, with the action of its task there."""
 
 
 class NoSuchSeat(UserError):
@@ -46,9 +46,9 @@ class RackProcess:
     """A process of a distributed rack.
 
     Attributes:
-        name: that of its first module, ``common_memory`` for the home.
+        name: that of its first module, ``common_memory`` for the process with common memory.
         slots: of its modules, in order.
-        holds_common_memory: then it alone publishes the rack's topics and takes what operators want.
+        holds_common_memory: then it alone publishes the rack's topics and receives the requests of operators.
         modules: the names of its modules, in the order of slots.
         reasons: why its modules share a process, a sentence each; () for a module alone.
     """
@@ -61,14 +61,14 @@ class RackProcess:
 
     @property
     def words(self) -> str:
-        """The process and what is in it, for messages."""
+        """The process and its modules, for messages."""
         return self.name if self.modules == (self.name,) else f"{self.name} ({' '.join(self.modules)})"
 
 
 def processes_of(config: RackConfig, programs: Iterable[Program] | None = None) -> tuple[RackProcess, ...]:
-    """Return the processes of a distributed rack: the home first, the others in the order of their first slots.
+    """Return the processes of a distributed rack: the one with common memory first, the others by their first slots.
 
-    ``programs`` are its tasks without errors; they are checked here where they are not given. A task with errors
+    ``programs`` are its tasks without errors; if they are not given, the tasks are checked here. A task with errors
     joins no modules: a rack with one does not start anyway.
     """
     if programs is None:
@@ -80,7 +80,7 @@ def processes_of(config: RackConfig, programs: Iterable[Program] | None = None) 
 
 
 def seat_named(seats: Sequence[RackProcess], text: str) -> RackProcess:
-    """Return the seat of a module, which is named by its slot or by its name, such as ``3`` or ``processor_3``.
+    """Return the process of a module, which is named by its slot or by its name, such as ``3`` or ``processor_3``.
 
     Raises:
         NoSuchSeat: the rack has no such module.
@@ -94,7 +94,7 @@ def seat_named(seats: Sequence[RackProcess], text: str) -> RackProcess:
 
 
 class _Bond(NamedTuple):
-    """Modules that may not be cut from each other."""
+    """Modules that must share a process."""
 
     slots: tuple[int, ...]
     reason: str
@@ -153,7 +153,7 @@ def _plant_bonds(config: RackConfig) -> Iterator[_Bond]:
 
 
 def _meeting_bonds(programs: Sequence[Program], homes: dict[str, int]) -> Iterator[_Bond]:
-    """Yield the modules whose tasks meet at an event or a channel."""
+    """Yield the modules whose tasks share an event or a channel."""
     met: dict[str, list[Program]] = {}
     for program in programs:
         events = [f"the event {event.name}" for event in program.events]
@@ -167,7 +167,7 @@ def _meeting_bonds(programs: Sequence[Program], homes: dict[str, int]) -> Iterat
 
 
 def _groups(slots: Sequence[int], bonds: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Return the slots in the least groups that no bond leads out of."""
+    """Return the slots in the smallest groups that contain every bond whole."""
     group = {slot: {slot} for slot in slots}
     for bond in bonds:
         joined = set().union(*(group[slot] for slot in bond))
@@ -183,6 +183,6 @@ def _seat(config: RackConfig, slots: tuple[int, ...], bonds: Iterable[_Bond]) ->
 
 
 def part_name(config: RackConfig, slots: Collection[int]) -> str:
-    """Return the name of the process that has the modules of some slots; ``slot N`` where the rack has none there."""
+    """Return the name of the process with the modules of some slots; ``slot N`` if the rack has none there."""
     first = min(slots, default=config.common_memory_slot)
     return next((module.name for module in config.modules if module.slot == first), f"slot {first}")

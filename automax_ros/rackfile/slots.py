@@ -1,4 +1,4 @@
-"""The slots of a rack: which module stands where. What it may say and where it may stand is its kind's business."""
+"""The slots of a rack and their modules. The kind of a module defines its keys and its allowed slots."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class SlotReader:
     """Reads the ``slots`` section."""
 
     def __init__(self, tasks: TaskReader, findings: ProblemList, executive: int, plants: Plants) -> None:
-        """Take the reader of tasks, which knows the names of the whole rack, and the Executive's version."""
+        """Create from the reader of tasks, which knows the names of the whole rack, and the Executive's version."""
         self._executive, self._plants = executive, plants
         self._tasks = tasks
         self._findings = findings
@@ -45,9 +45,9 @@ class SlotReader:
         self.unread: frozenset[int] = frozenset()
 
     def read(self, node: Node, span: Span) -> tuple[ModuleConfig, ...]:
-        """Return the modules that are right, in the order of slots; ``span`` is the place of the key ``slots``.
+        """Return the modules without errors, in the order of slots; ``span`` is the place of the key ``slots``.
 
-        ``unread`` are then the slots of the others: what is wrong there was told, and what follows from it need not be.
+        ``unread`` are then the slots of the others: their errors are reported, and consequences of these need not be.
         """
         entries = entries_of(node, "slots", self._findings)
         if entries is None:
@@ -104,7 +104,7 @@ class SlotReader:
         )
 
     def _model(self, entries: tuple[Entry, ...], what: str, key: Scalar) -> str | None:
-        """Return the number of a module that the emulator has; report AMX6202 to AMX6204 and AMX6211 for others."""
+        """Return the number of an emulated module; report AMX6202 to AMX6204 and AMX6211 for others."""
         node = next((value for name, value in entries if name.text == "module"), None)
         if node is None:
             self._findings.add("AMX6009", f"{what} lacks the key 'module'", key.span)

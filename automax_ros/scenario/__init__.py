@@ -1,1 +1,1 @@
-"""What happens to a rack by a file or by hand, and the report of how it ended."""
+"""Operations and signals of a rack from a file or by hand, and the report of a run's end."""

@@ -1,4 +1,4 @@
-"""What others than stimuli have done to a rack: operations of services and commands, for the report of a run."""
+"""Operations of services and commands, as opposed to stimuli, for the report of a run."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from automax_ros.scenario.stimuli.stage import OperationRecord
 
 
 class OperationLog:
-    """An observer that keeps operations with the names of stimuli verbs, and whatever was refused.
+    """An observer that keeps operations with the names of stimuli verbs, and all refused ones.
 
-    ``is_own`` says whether stimuli are acting, which keep their own list. Faults are not operations.
+    ``is_own`` returns whether stimuli are acting, which keep their own list. Faults are not operations.
     """
 
     def __init__(self, is_own: Callable[[], bool]) -> None:
-        """Begin with none."""
+        """Create an empty log."""
         self._is_own = is_own
         self.happened: list[OperationRecord] = []
 
     def operated(self, operation: Operation) -> None:
-        """Keep an operation that a person has asked for."""
+        """Keep an operation that an operator has requested."""
         is_fault = operation.what == "stop_all" and bool(operation.task or operation.detail)
         if self._is_own() or is_fault or (operation.ok and operation.what not in RACK_ONLY):
             return
@@ -34,10 +34,10 @@ class OperationLog:
         self.happened.append(OperationRecord(operation.at_ns, operation.what, of, operation.ok, why))
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
-        """Keep nothing of scans."""
+        """Ignore scans."""
 
     def written(self, writes: list[WriteGroup]) -> None:
-        """Keep nothing of writes."""
+        """Ignore writes."""
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """Keep nothing of tunables: setting one as an operator is an operation."""
+        """Ignore tunables: setting one as an operator is an operation."""

@@ -1,4 +1,4 @@
-"""How a run ended, as ``automax run --report`` writes it: docs/stimuli.md has the form."""
+"""The report of a run, as ``automax run --report`` writes it: docs/stimuli.md has the form."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def report_of(rack: Rack, happened: Iterable[OperationRecord] = ()) -> dict[str,
 
 
 def seconds(time_ns: int) -> float:
-    """Return a time in seconds, the float that is nearest."""
+    """Return a time in seconds, as the nearest float."""
     return time_ns / NS_PER_S
 
 
@@ -67,7 +67,7 @@ def _task(rack: Rack, name: str) -> dict[str, Any]:
 
 
 def _errors(log: ErrorLog) -> dict[str, Any]:
-    """Return an error log; an entry stands once, so ``last`` is null where it is the first or the second."""
+    """Return an error log; an entry is listed once, so ``last`` is null if it is the first or the second."""
     kept = [_entry(item) for item in log.entries]
     first, second, last = [*kept, None, None, None][:3]
     return {"count": log.count, "first": first, "second": second, "last": last}
@@ -79,7 +79,7 @@ def _entry(entry: LogEntry) -> dict[str, Any]:
 
 
 def _nested(value: Value | Sequence[Value], variable: CommonVariable) -> Any:
-    """Return a variable's value, an array's as lists in lists, one level for each subscript."""
+    """Return a variable's value, an array's as nested lists, one level for each subscript."""
     if isinstance(value, str) or not isinstance(value, Sequence):
         return value
     nested: list[Any] = list(value)

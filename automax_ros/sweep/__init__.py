@@ -1,1 +1,1 @@
-"""A rack run many times in simulated time with other values, each run measured."""
+"""Runs a rack many times in simulated time with different values, and measures each run."""

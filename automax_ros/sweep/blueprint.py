@@ -1,4 +1,4 @@
-"""A rack as text, from which any process on any machine makes the same racks; tasks are compiled once a process."""
+"""A rack as text, from which any process on any machine builds the same racks; tasks are compiled once per process."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from automax_ros.rackfile.plant_numbers import PlantNumber, with_numbers
 
 @dataclass(frozen=True)
 class RackTemplate:
-    """A rack file's text, what the file is called, and the sources of the tasks by name: no file is read again.
+    """A rack file's text and path, and the sources of the tasks by name: no file is read again.
 
-    ``native`` says which tasks scan as machine code, which changes no result.
+    ``native`` selects which tasks scan as machine code, which changes no result.
     """
 
     text: str
@@ -32,7 +32,7 @@ class RackTemplate:
 
     @classmethod
     def of(cls, rack: Rack, native: NativeForms = IN_PYTHON) -> RackTemplate:
-        """Return that of a rack as it is installed."""
+        """Return the template of a rack as it is installed."""
         return cls(rack.config.text, str(rack.config.path), tuple(rack.sources.items()), native)
 
     def prepare(self) -> None:
@@ -43,7 +43,7 @@ class RackTemplate:
         """Return a new rack with some other numbers of its plants.
 
         Raises:
-            Fault: with these numbers the rack file has errors.
+            UserError: with these numbers the rack file has errors.
         """
         config = _config(self.text, self.path, tuple(plants.items()))
         return Rack(config, installation=_installation(self).again(config))
@@ -51,7 +51,7 @@ class RackTemplate:
 
 @lru_cache(maxsize=1)
 def _config(text: str, path: str, numbers: tuple[tuple[PlantNumber, str], ...] = ()) -> RackConfig:
-    """Return what a text with other numbers of plants means; runs one after the other often have the same."""
+    """Return the configuration in a text with other numbers of plants; consecutive runs often have the same."""
     result = load_stored(SourceText(path, with_numbers(text, dict(numbers))), Path(path))
     if result.config is None:
         first = next(item for item in result.diagnostics if item.severity is Severity.ERROR)

@@ -1,9 +1,9 @@
-"""What a measure computes of a signal while a run goes.
+"""The functions of measures: each computes a number from a signal during a run.
 
 A signal holds a value until it is written again; what is written twice at one instant counts once, with the value that
 holds after that instant, and what happens at the very end of a window lies outside of it, as that of a run does
-(decision). So every measure is exact in time, and none depends on how often anything looks.
-Times are in ns from the beginning of the measure's window.
+(decision). So every measure is exact in time, and none depends on a sampling rate. Times are in ns from the start of
+the measure's window.
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ from automax_ros.core.ticks import NS_PER_S
 MOST_STEPS = 200_000
 """Most values that a measure of an unknown target keeps (decision): a signal of 16 bits has 65536 at most."""
 _RISE = (0.1, 0.9)
-"""Shares of the step between which the rise time lies."""
+"""Shares of the step between which the rise time is measured."""
 _PERCENT = 100.0
 
 
 class Accumulator(Protocol):
-    """Takes a signal piece by piece and gives one number."""
+    """Receives a signal piece by piece and returns one number."""
 
     def begin(self, before: float) -> None:
-        """Begin with the value that the signal had just before the window."""
+        """Start with the value of the signal just before the window."""
         ...
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        """Take a value that held from one time to a later one; the next piece begins where this one ends."""
+        """Add a value that held from one time to a later one; the next piece starts where this one ends."""
         ...
 
     def result(self, last: float, end_ns: int) -> float | None:
-        """Return the number, None where the signal has none; ``last`` is the last value that it was given."""
+        """Return the number, None if the signal has none; ``last`` is the last value added."""
         ...
 
 
 class _FromNow:
-    """For what the value before the window does not matter."""
+    """Base of functions that ignore the value before the window."""
 
     def begin(self, before: float) -> None:
-        """Forget it."""
+        """Ignore it."""
 
 
 class Mean(_FromNow):
@@ -56,7 +56,7 @@ class Mean(_FromNow):
         self._sum += value * (end_ns - begin_ns)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Divide by the time."""
+        """Return the sum divided by the time."""
         return self._sum / end_ns
 
 
@@ -71,7 +71,7 @@ class Rms(_FromNow):
         self._sum += value * value * (end_ns - begin_ns)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Take the root."""
+        """Return the root."""
         return math.sqrt(self._sum / end_ns)
 
 
@@ -82,7 +82,7 @@ class Range(_FromNow):
         self.least, self.most = math.inf, -math.inf
 
     def hold(self, value: float, begin_ns: int = 0, end_ns: int = 0) -> None:  # noqa: ARG002
-        """Compare."""
+        """Update the extremes."""
         self.least = min(self.least, value)
         self.most = max(self.most, value)
 
@@ -115,7 +115,7 @@ class Final(_FromNow):
     """The value at the end."""
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        """Wait for the end."""
+        """Do nothing: only the end counts."""
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
         """Return it."""
@@ -123,7 +123,7 @@ class Final(_FromNow):
 
 
 class TimeTrue(_FromNow):
-    """How long a BOOLEAN is TRUE, s."""
+    """The time for which a BOOLEAN is TRUE, s."""
 
     def __init__(self) -> None:
         self._ns = 0
@@ -139,13 +139,13 @@ class TimeTrue(_FromNow):
 
 
 class Count:
-    """How often a BOOLEAN becomes TRUE."""
+    """The number of times a BOOLEAN becomes TRUE."""
 
     def __init__(self) -> None:
         self._count, self._before = 0, False
 
     def begin(self, before: float) -> None:
-        """Compare the first value with it."""
+        """Store the value with which the first one is compared."""
         self._before = bool(before)
 
     def hold(self, value: float, begin_ns: int = 0, end_ns: int = 0) -> None:  # noqa: ARG002
@@ -154,18 +154,18 @@ class Count:
         self._before = bool(value)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return the edges."""
+        """Return the number of edges."""
         return self._count
 
 
 class Itae(_FromNow):
-    """The integral of time times distance from a target, which is 0 unless it is given."""
+    """The integral of time times distance from a target, by default 0."""
 
     def __init__(self, target: float = 0) -> None:
         self._target, self._sum = target, 0.0
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        """Add what a straight piece gives: (end² - begin²) / 2."""
+        """Add the integral over a constant piece: (end² - begin²) / 2."""
         self._sum += abs(value - self._target) * (end_ns * end_ns - begin_ns * begin_ns)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
@@ -174,7 +174,7 @@ class Itae(_FromNow):
 
 
 class Settle(_FromNow):
-    """When a signal has come into a band around its target for good, s; None where it ends outside.
+    """The time at which a signal enters a band around its target for good, s; None if it ends outside.
 
     The target is the last value unless it is given. A band in % is one of the target (decision), so that a disturbance
     has a band too.
@@ -187,7 +187,7 @@ class Settle(_FromNow):
         self._outside_ns = 0
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:  # noqa: ARG002
-        """Keep until when which values were exceeded: those that later ones exceed do not matter any more."""
+        """Store until when values were exceeded, without those that later values exceed."""
         if self._target is not None:
             if abs(value - self._target) > self._width(self._target):
                 self._outside_ns = end_ns
@@ -211,7 +211,7 @@ class Settle(_FromNow):
 
 
 def _push(stack: list[tuple[float, int]], value: float, end_ns: int) -> None:
-    """Put a value on a stack that ascends; the greater ones before it ended before it."""
+    """Push a value on an ascending stack; the greater ones before it ended before it, and are removed."""
     while stack and stack[-1][0] >= value:
         stack.pop()
     stack.append((value, end_ns))
@@ -223,28 +223,28 @@ def _push(stack: list[tuple[float, int]], value: float, end_ns: int) -> None:
 
 
 def _last_below(stack: list[tuple[float, int]], level: float) -> int:
-    """Return when the last value below a level ended, 0 where there was none."""
+    """Return when the last value below a level ended, 0 if there was none."""
     place = bisect_left(stack, level, key=lambda item: item[0])
     return stack[place - 1][1] if place else 0
 
 
 class Overshoot:
-    """How far a signal goes beyond its target, % of the step from its value before the window; None without a step."""
+    """How far a signal exceeds its target, % of the step from its value before the window; None without a step."""
 
     def __init__(self, target: float | None = None) -> None:
         self._target, self._start = target, 0.0
         self._range = Range()
 
     def begin(self, before: float) -> None:
-        """Take where the step begins."""
+        """Store the value at which the step starts."""
         self._start = before
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:  # noqa: ARG002
-        """Keep the extremes."""
+        """Update the extremes."""
         self._range.hold(value)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return 0 where the target is not passed."""
+        """Return the overshoot, 0 if the target is not passed."""
         target = last if self._target is None else self._target
         step = target - self._start
         if step == 0:
@@ -254,7 +254,7 @@ class Overshoot:
 
 
 class Rise:
-    """How long a signal takes from 10 % to 90 % of the step from its value before the window, s; None without one."""
+    """The time of a signal from 10 % to 90 % of the step from its value before the window, s; None without one."""
 
     def __init__(self, target: float | None = None) -> None:
         self._target, self._start = target, 0.0
@@ -262,11 +262,11 @@ class Rise:
         self._lows: list[tuple[float, int]] = []
 
     def begin(self, before: float) -> None:
-        """Take where the step begins."""
+        """Store the value at which the step starts."""
         self._start = before
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:  # noqa: ARG002
-        """Keep when each new extreme was reached."""
+        """Store when each new extreme was reached."""
         for records, item in ((self._highs, value), (self._lows, -value)):
             if not records or item > records[-1][0]:
                 records.append((item, begin_ns))
@@ -288,6 +288,6 @@ class Rise:
 
 
 def _first_at(records: list[tuple[float, int]], level: float) -> int | None:
-    """Return when a level was first reached, None where it never was."""
+    """Return when a level was first reached, None if it never was."""
     place = bisect_left(records, level, key=lambda item: item[0])
     return records[place][1] if place < len(records) else None

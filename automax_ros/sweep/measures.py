@@ -1,6 +1,6 @@
-"""Measures as people write them: ``rms(SPEED_ERR%) settle(SPEED%, 2 %) max(CUR%, from=1.0 to=3.0)``.
+"""Measures as text: ``rms(SPEED_ERR%) settle(SPEED%, 2 %) max(CUR%, from=1.0 to=3.0)``.
 
-A list of calls, with blanks or commas between them; nothing is evaluated but numbers.
+A list of calls, with blanks or commas between them; only numbers are evaluated.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TIMES = re.compile(r"[\s,]*\b(from|to)\s*=\s*([^\s,()]*)")
 
 
 class Subject(Enum):
-    """What a function is told of: the value is in words."""
+    """Kinds of subjects of a function: the value is in words."""
 
     NUMBER = "an INTEGER, DOUBLE INTEGER or REAL"
     BOOLEAN = "a BOOLEAN"
@@ -39,9 +39,9 @@ class Subject(Enum):
 
 @dataclass(frozen=True)
 class Function:
-    """A function of measures: its subject, how many numbers may follow, what makes its accumulator; ``unit`` is told.
+    """A function of measures: its subject, how many numbers may follow, the maker of its accumulator, its ``unit``.
 
-    With ``percent`` the first number may be one of %.
+    With ``percent`` the first number may be a percentage.
     """
 
     subject: Subject
@@ -80,7 +80,7 @@ class Measure:
     """A measure; ``subject`` is a common with its subscripts, a task, or "".
 
     ``numbers`` follow the subject, the first of them in % with ``percent``. The window is from ``start_ns`` to
-    ``end_ns``, the run's end where that is None.
+    ``end_ns``, the run's end if that is None.
     """
 
     function: str
@@ -92,7 +92,7 @@ class Measure:
 
     @property
     def label(self) -> str:
-        """The measure as it would be written."""
+        """The measure's text."""
         if not self.subject:
             return self.function
         parts = [self.subject, *map(_number_text, self.numbers)]
@@ -104,11 +104,11 @@ class Measure:
 
     @property
     def is_of_common(self) -> bool:
-        """Whether a common is watched for it."""
+        """Whether it watches a common."""
         return FUNCTIONS[self.function].subject in (Subject.NUMBER, Subject.BOOLEAN)
 
     def accumulator(self) -> Accumulator:
-        """Return what computes it, for one run."""
+        """Return a new accumulator for one run."""
         function = FUNCTIONS[self.function]
         return function.make(*self.numbers, percent=self.percent) if function.percent else function.make(*self.numbers)
 
@@ -117,7 +117,7 @@ def read_measures(text: str, config: RackConfig, duration_ns: int) -> tuple[Meas
     """Return the measures of a list for runs of a rack, each once, in their order.
 
     Raises:
-        Fault: it cannot be read, or names what the rack does not have.
+        UserError: it cannot be read, or names something that the rack does not have.
     """
     if len(text) > MOST_CHARACTERS:
         raise UserError(f"{len(text)} characters of measures: at most {MOST_CHARACTERS} are read")
@@ -144,7 +144,7 @@ def read_measures(text: str, config: RackConfig, duration_ns: int) -> tuple[Meas
 
 
 def _closing(text: str, place: int) -> int:
-    """Return where the parenthesis closes that was opened before a place."""
+    """Return the place of the parenthesis that closes the one opened before ``place``."""
     depth = 1
     for at in range(place, len(text)):
         depth += {"(": 1, ")": -1}.get(text[at], 0)
@@ -179,7 +179,7 @@ def _measure(name: str, inner: str, config: RackConfig, duration_ns: int) -> Mea
 
 
 def _parts(inner: str) -> list[str]:
-    """Return what stands between commas, those within a subscript aside."""
+    """Return the parts between commas, except those within a subscript."""
     parts, depth = [""], 0
     for char in inner:
         depth += {"(": 1, ")": -1}.get(char, 0)
@@ -203,7 +203,7 @@ def _times(name: str, inner: str) -> dict[str, int]:
 
 
 def _subject(function: Function, name: str, text: str, config: RackConfig) -> str:
-    """Return the full name of what a measure is of."""
+    """Return the full name of a measure's subject."""
     if function.subject is Subject.NOTHING:
         if text:
             raise UserError(f"{name} is of the rack, not of {quoted(text)}", f"write {name}")

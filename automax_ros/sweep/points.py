@@ -1,4 +1,4 @@
-"""Which values the runs of a sweep have: all combinations of lists, or a Latin hypercube through them."""
+"""The values of the runs of a sweep: all combinations of lists, or a Latin hypercube through them."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MOST_QUANTITIES = 20
 """Most quantities that vary in one sweep (decision)."""
 _FORM = "write NAME=LOW:HIGH:N, NAME=LOW:HIGH with --sample, or NAME=VALUE,VALUE"
 Point = tuple[Value, ...]
-"""The values of one run, a quantity each."""
+"""The values of one run, one per quantity."""
 
 
 @dataclass(frozen=True)
 class Varied:
-    """A quantity with its values; without ``values`` it lies anywhere from ``low`` to ``high``: a sample needs that."""
+    """A quantity with its values; without ``values``, allowed only in a sample, it is from ``low`` to ``high``."""
 
     variable: Variable
     values: tuple[Value, ...] = ()
@@ -35,11 +35,11 @@ class Varied:
 
     @property
     def quantity(self) -> Quantity:
-        """What varies."""
+        """The quantity that varies."""
         return self.variable.quantity
 
     def at(self, share: float) -> Value:
-        """Return the value at a share of the way, 0 to below 1: each of the values, or whole numbers, as likely."""
+        """Return the value at a share from 0 to below 1: each value of a list, or whole number, is equally likely."""
         if self.values:
             return self.values[int(share * len(self.values))]
         if self.variable.is_whole:
@@ -48,10 +48,10 @@ class Varied:
 
 
 def read_varied(rack: Rack, text: str) -> Varied:
-    """Return what ``NAME=LOW:HIGH:N``, ``NAME=LOW:HIGH`` or ``NAME=VALUE,VALUE`` says of a rack.
+    """Return the quantity and values of ``NAME=LOW:HIGH:N``, ``NAME=LOW:HIGH`` or ``NAME=VALUE,VALUE`` in a rack.
 
     Raises:
-        Fault: it cannot be read, there is no such quantity, or a value does not fit it.
+        UserError: it cannot be read, there is no such quantity, or a value does not fit it.
     """
     name, equals, given = text.partition("=")
     if not equals or not given.strip():
@@ -74,7 +74,7 @@ def grid(varied: Sequence[Varied]) -> list[Point]:
     """Return all combinations, the last quantity's values fastest.
 
     Raises:
-        Fault: there are too many, or a quantity has no values of its own.
+        UserError: there are too many, or a quantity has no list of values.
     """
     _check_quantities(varied)
     for item in varied:
@@ -90,11 +90,11 @@ def grid(varied: Sequence[Varied]) -> list[Point]:
 def sample(varied: Sequence[Varied], count: int, seed: int) -> list[Point]:
     """Return the points of a Latin hypercube: each quantity's range in ``count`` parts, one point in each.
 
-    Whole numbers and values of lists are as likely as each other. Points that are the same occur once (decision), so
-    there may be fewer than ``count``.
+    Whole numbers and values of lists are equally likely. Equal points occur once (decision), so there may be fewer than
+    ``count``.
 
     Raises:
-        Fault: too many quantities or points are wanted, or scipy is missing.
+        UserError: too many quantities or points are wanted, or scipy is missing.
     """
     _check_quantities(varied)
     _check_count(count)
@@ -122,7 +122,7 @@ def _check_count(count: int) -> None:
 
 
 def _exact(variable: Variable, text: str) -> Fraction:
-    """Return an end of a range as it is written; it must fit."""
+    """Return an end of a range exactly as written; it must fit."""
     variable.accepted(text.strip())
     return Fraction(text.strip())
 

@@ -1,4 +1,4 @@
-"""What can vary from run to run: tunables of tasks, commons before RUN, numbers of plants, by the names they have."""
+"""Quantities that vary from run to run, by name: tunables of tasks, commons before RUN, numbers of plants."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from automax_ros.rackfile.plant_numbers import PlantNumber, plant_number
 
 @dataclass
 class Beginning:
-    """What one run begins with: other numbers of plants, tunables, and commons as an operator would write them."""
+    """Start values of one run: other numbers of plants, tunables, and commons as an operator would write them."""
 
     plants: dict[PlantNumber, str] = field(default_factory=dict)
     tunings: list[Tuning] = field(default_factory=list)
@@ -26,7 +26,7 @@ class Beginning:
 
 
 class Quantity(Protocol):
-    """Something that varies. ``label`` is its full name; ``text`` writes a value so that it is read as the same one."""
+    """A quantity that varies. ``label`` is its full name; ``text`` writes a value so that it is read as the same."""
 
     @property
     def label(self) -> str: ...  # noqa: D102
@@ -34,7 +34,7 @@ class Quantity(Protocol):
     def text(self, value: Value, /) -> str: ...  # noqa: D102
 
     def give(self, value: Value, beginning: Beginning) -> None:
-        """Let a run begin with a value."""
+        """Add a value of the quantity to a run's start values."""
         ...
 
 
@@ -51,11 +51,11 @@ class VariedTunable:
         return f"{self.task}.{bare_name(self.name)}"
 
     def text(self, value: Value) -> str:
-        """Return a value as it is read."""
+        """Return a value as text that is read as the same value."""
         return value_text(value)
 
     def give(self, value: Value, beginning: Beginning) -> None:
-        """Tune it before RUN."""
+        """Add the tuning, to be made before RUN."""
         beginning.tunings.append(Tuning(self.task, self.name, value))
 
 
@@ -66,11 +66,11 @@ class VariedCommon:
     label: str
 
     def text(self, value: Value) -> str:
-        """Return a value as it is read."""
+        """Return a value as text that is read as the same value."""
         return value_text(value)
 
     def give(self, value: Value, beginning: Beginning) -> None:
-        """Write it before RUN, after the presets."""
+        """Add the write, to be made before RUN, after the presets."""
         beginning.settings.append((self.label, value))
 
 
@@ -86,19 +86,19 @@ class VariedPlant:
         return self.number.label
 
     def text(self, value: Value) -> str:
-        """Return a value as it is read."""
+        """Return a value as text that is read as the same value."""
         return repr(value)
 
     def give(self, value: Value, beginning: Beginning) -> None:
-        """Build the plant with it."""
+        """Add the number, with which the plant is built."""
         beginning.plants[self.number] = self.text(value)
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A quantity with what it takes: ``accepted`` returns the value that a text gives it, or raises Fault.
+    """A quantity with its rules: ``accepted`` returns the value that a text gives it, or raises UserError.
 
-    ``is_whole``: whole numbers alone; ``is_number``: it has values between others.
+    ``is_whole``: only whole numbers; ``is_number``: it has values between others.
     """
 
     quantity: Quantity
@@ -108,12 +108,12 @@ class Variable:
 
 
 def variable_named(rack: Rack, text: str) -> Variable:
-    """Return what a name means: ``REF%``, ``TABLE%(3)``, ``SPEED.KP``, ``UNWIND.load.torque_nm``.
+    """Return the quantity with a name: ``REF%``, ``TABLE%(3)``, ``SPEED.KP``, ``UNWIND.load.torque_nm``.
 
-    Where a task and a plant have one name, the task's tunables come first (decision).
+    If a task and a plant have the same name, the task's tunables come first (decision).
 
     Raises:
-        Fault: there is no such thing, or it cannot vary.
+        UserError: there is no such quantity, or it cannot vary.
     """
     owner, dot, name = text.partition(".")
     if not dot:
@@ -144,7 +144,7 @@ def _common(rack: Rack, text: str) -> Variable:
 
 
 def _tunable_hint(rack: Rack, text: str) -> str | None:
-    """Return the hint that a name without its task is a tunable's; None where no task has one of it."""
+    """Return the hint that a name without its task is a tunable's; None if no task has such a tunable."""
     wanted = text.strip().upper()
     owners = [task.name for task in rack.tasks if _is_tunable(rack, task.name, wanted)]
     return (

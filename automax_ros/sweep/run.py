@@ -1,4 +1,4 @@
-"""One run of a sweep: a fresh rack in simulated time, from its values to its measures."""
+"""One run of a sweep: a new rack in simulated time, from its values to its measures."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from automax_ros.sweep.quantities import Beginning, Quantity
 from automax_ros.sweep.watching import Watch
 
 _SLICE_NS = 100 * NS_PER_MS
-"""Rack time between two looks at the write log, which is kept meanwhile."""
+"""Rack time after which the write log is read, which grows meanwhile."""
 
 
 @dataclass(frozen=True)
 class Stimuli:
-    """A stimuli file, read by each process: ``digest`` is that of its bytes, so that all read the same."""
+    """A stimuli file, which each process reads: ``digest`` is that of its bytes, so that all read the same."""
 
     path: Path
     digest: str
@@ -40,14 +40,14 @@ class Stimuli:
         """Return a file as it is now.
 
         Raises:
-            Fault: it cannot be read.
+            UserError: it cannot be read.
         """
         return cls(path.absolute(), _digest(path), allow_outside)
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What all runs of a sweep share."""
+    """The common part of all runs of a sweep."""
 
     blueprint: RackTemplate
     quantities: tuple[Quantity, ...]
@@ -56,7 +56,7 @@ class Plan:
     stimuli: Stimuli | None = None
 
     def beginning(self, point: Point) -> Beginning:
-        """Return what the run of a point begins with."""
+        """Return the start values for the run of a point."""
         beginning = Beginning()
         for quantity, value in zip(self.quantities, point, strict=True):
             quantity.give(value, beginning)
@@ -65,17 +65,17 @@ class Plan:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run: a number or None for each measure; ``fault`` says why it is not as it should be, or ""."""
+    """Result of a run: a number or None for each measure; ``fault`` is the reason of a failure, or ""."""
 
     measures: tuple[float | None, ...]
     fault: str = ""
 
 
 def run_points(plan: Plan, points: Sequence[Point]) -> list[Outcome]:
-    """Run points one after the other: the work of a piece.
+    """Run points one after the other, as one job.
 
     Raises:
-        Fault: the stimuli file is not the one of the plan.
+        UserError: the stimuli file differs from the plan's.
     """
     if plan.stimuli is not None and _digest(plan.stimuli.path) != plan.stimuli.digest:
         raise UserError(f"the stimuli file {plan.stimuli.path} is another one on {platform.node()}")
@@ -88,11 +88,11 @@ def run_point(
     attend: Callable[[Rack], Callable[[], None]] | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Outcome:
-    """Run one point; whatever goes wrong becomes the outcome's fault, so that it ends no other run (decision).
+    """Run one point; any error becomes the outcome's fault, so that it ends no other run (decision).
 
-    A run that a fault stops has no measures but ``errors`` and ``stopped`` (decision): STOP ALL clears what they would
-    be of. ``attend`` is given the rack before it starts and returns what is called at its end. When ``should_stop``
-    says so, the run ends there, and its outcome is none.
+    A run that a fault stops has no measures but ``errors`` and ``stopped`` (decision): STOP ALL clears the commons that
+    they would measure. ``attend`` is called with the rack before it starts and returns a function that is called at its
+    end. If ``should_stop`` returns TRUE, the run ends there, and its outcome is not valid.
     """
     try:
         return _run(plan, plan.beginning(point), attend, should_stop)
@@ -132,7 +132,7 @@ def _run(
 
 
 def _pass(rack: Rack, plan: Plan, stimulation: StimuliPlayer, should_stop: Callable[[], bool]) -> None:
-    """Let the time pass: as `automax run` does, to the end where stimuli may put the rack into RUN again."""
+    """Advance time as `automax run` does: after a fault only while stimuli may put the rack into RUN again."""
     while rack.now_ns < plan.duration_ns and not should_stop():
         if rack.stop_reason is not None and (plan.stimuli is None or stimulation.is_over):
             cause = rack.operations.stopped

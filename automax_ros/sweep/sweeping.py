@@ -1,4 +1,4 @@
-"""Runs the points of a sweep, here, side by side, or on a cluster: the same rows in the same order wherever."""
+"""Runs the points of a sweep, in this process, in several, or on a cluster: the same rows in the same order."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from automax_ros.sweep.points import Point
 from automax_ros.sweep.run import Outcome, Plan, run_points
 
 _PIECES_EACH = 8
-"""Pieces that a process gets (decision): so that all end at about the same time."""
+"""Pieces per process (decision): so that all end at about the same time."""
 _CLUSTER_PIECES = 256
-"""Pieces that a cluster gets, whose size is not known (decision)."""
+"""Pieces for a cluster, whose size is not known (decision)."""
 _MOST_IN_PIECE = 50
-"""Most runs of a piece (decision): what is lost with a worker."""
+"""Most runs of a piece (decision): those that are lost with a worker."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A run: its number from 1 on, its values, what came of it."""
+    """A run: its number from 1 on, its values, its outcome."""
 
     number: int
     point: Point
@@ -34,9 +34,9 @@ def run_sweep(
     on_rows: Callable[[list[Row]], None] = lambda _: None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> list[Row]:
-    """Run all points; return a row for each in their order, fewer where ``should_stop`` has ended it before.
+    """Run all points; return a row for each in their order, or fewer if ``should_stop`` ended it early.
 
-    ``on_rows`` is told rows as they come, in any order. A row depends on nothing but the plan and its point.
+    ``on_rows`` receives rows as they come, in any order. A row depends on nothing but the plan and its point.
 
     Raises:
         ClusterFault: the cluster cannot be used.
@@ -55,7 +55,7 @@ def run_sweep(
 
 
 def _size(count: int, where: Workers) -> int:
-    """Return how many runs are a piece."""
+    """Return the number of runs in a piece."""
     if where.scheduler is None and where.processes == 1:
         return 1
     pieces = _CLUSTER_PIECES if where.scheduler is not None else where.processes * _PIECES_EACH
@@ -69,7 +69,7 @@ def _piece(plan: Plan, points: Sequence[Point], first: int, size: int) -> Job:
 
 
 def _rows(done: JobResult, first: int) -> Iterable[Row]:
-    """Return the rows of a piece; where the piece itself has failed, each has its fault."""
+    """Return the rows of a piece; if the piece itself has failed, each has its fault."""
     plan, points = done.piece.arguments
     outcomes = done.result
     if outcomes is None:
@@ -79,7 +79,7 @@ def _rows(done: JobResult, first: int) -> Iterable[Row]:
 
 
 def best_rows(rows: Sequence[Row], measure: int, *, greatest: bool = False) -> list[Row]:
-    """Return the rows without a fault that have a measure, the best first; of equals the earlier."""
+    """Return the rows without a fault that have a measure, the best first; of equal ones the earlier first."""
     sign = -1 if greatest else 1
     found = ((row.outcome.measures[measure], row) for row in rows if not row.outcome.fault)
     known = [(sign * value, row.number, row) for value, row in found if value is not None]

@@ -1,4 +1,4 @@
-"""The rows of a sweep as files: CSV for people and spreadsheets, NumPy for programs. Same rows, same bytes."""
+"""The rows of a sweep as files: CSV for spreadsheets, NumPy for programs. Same rows, same bytes."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def headings(plan: Plan) -> list[str]:
-    """Return the names of the columns: run, what varies, measures, fault."""
+    """Return the names of the columns: run, quantities, measures, fault."""
     quantities = [item.label for item in plan.quantities]
     return [RUN, *quantities, *(item.label for item in plan.measures), FAULT]
 
 
 def write_csv(plan: Plan, rows: Sequence[Row], repeat: Callable[[Row], str], stream: TextIO) -> None:
-    """Write a row a run; an empty cell is a measure that the run does not have. ``repeat`` is the last column."""
+    """Write one row per run; a cell is empty if the run does not have the measure. ``repeat`` is the last column."""
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*headings(plan), REPEAT])
     for row in rows:
@@ -37,9 +37,9 @@ def write_csv(plan: Plan, rows: Sequence[Row], repeat: Callable[[Row], str], str
 
 
 def write_npz(plan: Plan, rows: Sequence[Row], path: Path) -> None:
-    """Write a NumPy file: an array for each column under its heading; measures are float64, NaN where there is none.
+    """Write a NumPy file: an array for each column under its heading; measures are float64, NaN if the run has none.
 
-    ``names`` are the headings of what varies, ``measures`` those of the measures.
+    ``names`` are the headings of the quantities, ``measures`` those of the measures.
 
     Raises:
         OSError: it cannot be written.
@@ -65,7 +65,7 @@ def write_npz(plan: Plan, rows: Sequence[Row], path: Path) -> None:
 
 
 def records(plan: Plan, rows: Sequence[Row], repeat: Callable[[Row], str]) -> list[dict[str, Any]]:
-    """Return the rows as data for JSON; null is a measure that the run does not have."""
+    """Return the rows as data for JSON, with null if the run does not have a measure."""
     return [
         {
             RUN: row.number,

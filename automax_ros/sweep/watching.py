@@ -1,4 +1,4 @@
-"""Watches the commons that measures are of, while a run goes: each change as the write log tells it."""
+"""Watches the commons of measures during a run: each change in the write log."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from automax_ros.sweep.measures import Measure
 
 @dataclass
 class _Window:
-    """A measure while it is computed; ``last`` is the latest value within its window, before that the one before it."""
+    """A measure in progress; ``last`` is the latest value within its window, before that the one before it."""
 
     accumulator: Accumulator
     start_ns: int
@@ -27,7 +27,7 @@ class _Window:
     has_begun: bool = False
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        """Take a piece of the signal, as far as it lies within the window."""
+        """Add the part of a piece of the signal that is within the window."""
         begin, end = max(begin_ns, self.start_ns), min(end_ns, self.end_ns)
         if begin_ns < self.start_ns:
             self.last = value
@@ -52,14 +52,14 @@ class _Signal:
     windows: list[_Window] = field(default_factory=list)
 
     def change(self, time_ns: int, value: Value) -> None:
-        """Take a value that holds from a time on."""
+        """Set a value that holds from ``time_ns`` on."""
         assert not isinstance(value, str)
         if value != self.value:
             self.flush(time_ns)
             self.value = value
 
     def flush(self, time_ns: int) -> None:
-        """Take the present value up to a time."""
+        """Add the present value up to a time to all windows."""
         if time_ns > self.since_ns:
             for window in self.windows:
                 window.hold(self.value, self.since_ns, time_ns)
@@ -67,12 +67,12 @@ class _Signal:
 
 
 class Watch:
-    """Computes measures of a rack that runs, as an observer of it that needs no records of scans."""
+    """Computes measures of a running rack, as an observer that needs no records of scans."""
 
     def __init__(self, rack: Rack, measures: Sequence[Measure], end_ns: int) -> None:
-        """Watch a rack that was just started, until ``end_ns``: presets are what its commons held before."""
+        """Watch a rack that was just started, until ``end_ns``: presets are the values before."""
         self._signals: dict[int, dict[int, _Signal]] = {}
-        """By element, then by view: most writes are of simple commons that nobody watches."""
+        """By element, then by view: most writes are of simple commons that are not watched."""
         self._windows: dict[Measure, _Window] = {}
         for measure in measures:
             if measure.is_of_common:
@@ -80,14 +80,14 @@ class Watch:
         rack.observers.add(self)
 
     def results(self, end_ns: int) -> dict[Measure, float | None]:
-        """Return what came of the measures of commons."""
+        """Return the results of the measures of commons."""
         for signals in self._signals.values():
             for signal in signals.values():
                 signal.flush(end_ns)
         return {measure: window.result() for measure, window in self._windows.items()}
 
     def written(self, writes: list[WriteGroup]) -> None:
-        """Take what was written, by scans too where none keeps records."""
+        """Process writes, including those of scans if no records are kept."""
         elements = self._signals
         for group in writes:
             signals = elements.get(group.element)
@@ -98,14 +98,14 @@ class Watch:
                     signals[view].change(group.time_ns, value)
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
-        """Take what a scan has written."""
+        """Process the writes of a scan."""
         self.written(writes)
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """Heed no tunables."""
+        """Ignore tunables."""
 
     def operated(self, operation: Operation) -> None:
-        """Heed no operations."""
+        """Ignore operations."""
 
     def _add(self, rack: Rack, measure: Measure, end_ns: int) -> None:
         meant = common_named(rack.config, measure.subject)

@@ -1,1 +1,1 @@
-"""What the coefficients of dynamic blocks mean: corners, step and frequency responses."""
+"""Analyses the coefficients of dynamic blocks: corners, step and frequency responses."""

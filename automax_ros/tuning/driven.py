@@ -1,4 +1,4 @@
-"""A dynamic block driven by a signal: its real step, scan after scan, with its coefficients computed once."""
+"""A dynamic block driven by a signal: its real step, scan by scan, with its coefficients computed once."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from automax_ros.core.types import DataType, Value
 
 _ANY_CHANGE = INT16_MAX - INT16_MIN
 STANDING = "MAX_CHANGE 0"
-"""What a block is told to have run into that may not move at all."""
+"""The limit that is reported for a block that may not move at all."""
 MOST_SCANS_TO_REST = 1 << 16
-"""Scans in which a block comes to rest: MAX_CHANGE = 1 takes as many as there are counts."""
+"""Most scans in which a block comes to rest: MAX_CHANGE = 1 takes as many as there are counts."""
 
 
 class DrivenBlock:
-    """A block that one signal of whole counts drives, from rest: where it comes to stand while the signal is 0.
+    """A block that one signal of whole counts drives, from rest: the state to which it settles with the signal at 0.
 
-    The block's declaration says which input carries the signal; the others that could are 0. ``integrator`` is the
-    one inside the block, None where it has none.
+    The block's declaration names the input that carries the signal; the others that could are 0. ``integrator`` is the
+    one inside the block, None if it has none.
     """
 
     def __init__(self, block: Block, period_ns: int, parameters: Mapping[str, Value]) -> None:
-        """Take the scan period and the values of all inputs but the signal, by keyword; others have their defaults.
+        """Create from the scan period and the values of inputs but the signal, by keyword; others have their defaults.
 
-        ``block`` is one whose dynamics can be measured.
+        ``block`` must have measurable dynamics.
         """
         assert block.coefficients is not None
         dynamics = block.coefficients.dynamics
@@ -53,13 +53,13 @@ class DrivenBlock:
         self.begin()
 
     def begin(self) -> None:
-        """Put the block to rest and forget what it ran into."""
+        """Put the block to rest and forget the limits that it reached."""
         self._instance.state = dict(self._start)
         self._last = self._rest
         self._touched: set[str] = set()
 
     def _come_to_rest(self) -> int:
-        """Leave the states, and return the output, at which a signal of 0 leaves the block."""
+        """Set the states, and return the output, to which the block settles with a signal of 0."""
         block, output = self._instance.block, 0
         states = slice(len(block.outputs), len(block.outputs) + len(block.states))
         before = tuple(state.initial for state in block.states)
@@ -73,32 +73,32 @@ class DrivenBlock:
 
     @property
     def room(self) -> int:
-        """How many counts OUTPUT may move to either side of rest."""
+        """Counts by which OUTPUT may move to either side of rest."""
         return max(0, min(self._bounds.high - self._rest, self._rest - self._bounds.low))
 
     @property
     def rest(self) -> int:
-        """The output while the signal is 0: what is added to it, within the limits."""
+        """The output while the signal is 0: the sum of the inputs added to it, within the limits."""
         return self._rest
 
     @property
     def most_change(self) -> int:
-        """How many counts OUTPUT may move in a scan."""
+        """Counts by which OUTPUT may move in a scan."""
         return self._bounds.most_change
 
     @property
     def inner_room(self) -> float | None:
-        """How many counts the integrator may move to either side of 0; None for a block without one that is limited."""
+        """Counts by which the integrator may move to either side of 0; None for a block without a limited one."""
         inner = self._bounds.inner
         return None if inner is None else max(0.0, min(inner[1], -inner[0]))
 
     @property
     def touched(self) -> tuple[str, ...]:
-        """What the block ran into since ``forget``: limits, the range of section 51, MAX_CHANGE, 16 bits."""
+        """Limits that the block reached since ``forget``: limits, the range of section 51, MAX_CHANGE, 16 bits."""
         return tuple(sorted(self._touched))
 
     def forget(self) -> None:
-        """Forget what it ran into, and go on."""
+        """Forget the limits that it reached, without a reset."""
         self._touched.clear()
 
     def run(self, signal: Iterable[int]) -> list[int]:
@@ -119,7 +119,7 @@ class DrivenBlock:
         return found
 
     def _notice(self, found: list[int], least: float, most: float) -> None:
-        """Note what a run went into."""
+        """Record the limits that a run reached."""
         if not found:
             return
         bounds = self._bounds
@@ -139,7 +139,7 @@ class DrivenBlock:
 
 
 class _Bounds:
-    """What limits a block: its output, and its integrator where it has one that is limited."""
+    """The limits of a block: of its output, and of its integrator if that is limited."""
 
     def __init__(self, inputs: Mapping[str, Value]) -> None:
         self.high = int(inputs.get("LIMIT_PLUS", INT16_MAX))
@@ -167,7 +167,7 @@ def _bounds(integrator: Integrator | None, inputs: Mapping[str, Value], coeffici
 
 
 def _divided(block: Block, carrier: str, parameters: Mapping[str, Value]) -> tuple[dict[str, Value], dict[str, Value]]:
-    """Return the literals of a block and its other inputs, in lower case; signals that do not move are 0."""
+    """Return the literals of a block and its other inputs, in lower case; signals other than the driving one are 0."""
     fixed: dict[str, Value] = {}
     standing: dict[str, Value] = {}
     for item in block.inputs:

@@ -1,4 +1,4 @@
-"""The dynamic blocks of a task, by line, with the values of their parameters as far as they are known."""
+"""The dynamic blocks of a task, by line, with the values of their parameters where they are known."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ class CallFault(UserError):
 
 
 class NoDynamicBlock(UserError):
-    """A line that was asked for has no dynamic block."""
+    """A requested line has no dynamic block."""
 
 
 class ValueFault(UserError):
-    """A value that was given for a variable is for no block."""
+    """A value was given for a variable that no block uses."""
 
 
 class Source(enum.Enum):
-    """Where the value of a parameter comes from."""
+    """The source of a parameter's value."""
 
     LITERAL = "literal"
     DEFAULT = "default"
@@ -60,9 +60,9 @@ class Source(enum.Enum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """An input of a CALL: its value, None where it is a variable of which nothing is known; ``variable`` its text.
+    """An input of a CALL: its value, None for a variable without a known value; ``variable`` is its text.
 
-    The value is what the block sees: that of a variable that is ``inverted`` is turned round.
+    The value is the one at the block's input: that of an ``inverted`` variable has the opposite sign.
     """
 
     keyword: str
@@ -73,7 +73,7 @@ class Parameter:
 
     @property
     def text(self) -> str:
-        """The variable as the CALL has it, with its minus sign."""
+        """The variable as written in the CALL, with its minus sign."""
         return f"-{self.variable}" if self.inverted else self.variable
 
 
@@ -81,8 +81,8 @@ class Parameter:
 class DynamicCall:
     """A CALL of a block with coefficients: ``label`` is its line as in state names, ``output`` the variable it writes.
 
-    ``parameters`` are the inputs that are programmed, by keyword. ``inside`` says where it stands if it may not run
-    once in every scan: ``IF``, ``FOR`` or ``subroutine``, the innermost.
+    ``parameters`` are the programmed inputs, by keyword. ``inside`` is set if it may not run once in every scan:
+    ``IF``, ``FOR`` or ``subroutine``, the innermost.
     """
 
     label: str
@@ -98,7 +98,7 @@ class DynamicCall:
 
     @property
     def dynamics(self) -> Dynamics:
-        """What the block is as a function of frequency."""
+        """The block as a function of frequency."""
         assert self.block.coefficients is not None
         return self.block.coefficients.dynamics
 
@@ -116,7 +116,7 @@ class DynamicCall:
         return {name: float(value) if isinstance(value, (int, float)) else None for name, value in found.items()}
 
     def standing_inputs(self) -> tuple[dict[str, Value], list[str]]:
-        """Return the inputs but the signal, by keyword, and what had to be assumed of variables nothing is known of."""
+        """Return the inputs but the signal, by keyword, and the assumptions on variables without a known value."""
         inputs: dict[str, Value] = {}
         assumed: list[str] = []
         for name, given in self.parameters.items():
@@ -132,7 +132,7 @@ class DynamicCall:
 
 
 def _unprogrammed(block: Block, name: str) -> Value:
-    """Return what an input is that no CALL programs."""
+    """Return the value of an input that the CALL does not program."""
     item = next(item for item in block.inputs if item.name == name)
     if item.default is not None:
         return item.default
@@ -144,12 +144,12 @@ def dynamic_calls(
 ) -> list[DynamicCall]:
     """Return the dynamic blocks of a task in the order of the text, or the one on a line.
 
-    ``values`` are those of variables, by the label of ``core.names``; they may be what coefficients come from and, of
-    blocks that are to be driven, every other input but the signal.
+    ``values`` are those of variables, by the label of ``core.names``: the sources of coefficients and, for blocks that
+    are to be driven, every other input but the signal.
 
     Raises:
         NoDynamicBlock: there is none on that line.
-        ValueFault: a value is for no block.
+        ValueFault: no block uses a value.
     """
     bound = _labelled(program)
     if label is not None:
@@ -169,7 +169,7 @@ def dynamic_calls(
 
 
 def tuning_of(call: DynamicCall, program: Program) -> Tuning:
-    """Return what the coefficients of a CALL mean in its task."""
+    """Return the tuning of a CALL in its task."""
     return tuning(call.block, program.period_ns / NS_PER_S, call.coefficients)
 
 
@@ -186,7 +186,7 @@ def require_running(call: DynamicCall) -> None:
 
 
 def _refuse(name: str, calls: Sequence[DynamicCall]) -> None:
-    """Refuse to set a variable that a block takes, but not for what is to be set."""
+    """Refuse to set a variable that a block uses, but not as a settable input."""
     for call in calls:
         for item in call.parameters.values():
             if not item.variable or _plain(item.variable) != name:
@@ -213,7 +213,7 @@ def _settable(call: DynamicCall, *, driven: bool) -> list[Parameter]:
 
 
 def _labelled(program: Program) -> dict[str, tuple[BoundCall, str]]:
-    """Return the dynamic blocks by line, with what they stand in.
+    """Return the dynamic blocks by line, with the statement around each.
 
     A further CALL of one line counts from 2, whatever the first one is.
     """
@@ -232,7 +232,7 @@ def _labelled(program: Program) -> dict[str, tuple[BoundCall, str]]:
 def _calls_in_order(
     statements: Iterable[Statement], subroutines: Collection[int], inside: str
 ) -> Iterator[tuple[Call, str]]:
-    """Yield every CALL in the order of the text, with what it stands in: a subroutine goes on up to its RETURN."""
+    """Yield every CALL in the order of the text, with the statement around it: a subroutine ends at its RETURN."""
     here = inside
     for statement in statements:
         if statement.number in subroutines:
@@ -247,7 +247,7 @@ def _calls_in_order(
 
 
 def _subroutines(program: Program) -> set[int]:
-    """Return the lines at which subroutines begin."""
+    """Return the lines at which subroutines start."""
     found: set[int] = set()
     for statement, _ in statements_in_order((*program.startup, *program.scan)):
         if isinstance(statement, Gosub):
@@ -277,7 +277,7 @@ def _listed(bound: Mapping[str, tuple[BoundCall, str]]) -> str:
 
 
 def _output(bound: BoundCall) -> str:
-    """Return the text of the variable that gets the block's output."""
+    """Return the text of the variable that receives the block's output."""
     assert bound.block.coefficients is not None
     wanted = bound.block.coefficients.dynamics.output
     return print_expression(bound.arguments[wanted]) if wanted in bound.arguments else "-"

@@ -14,26 +14,26 @@ from automax_ros.core.types import Value
 from automax_ros.tuning.driven import DrivenBlock
 
 NORMAL_AMPLITUDE = 4095
-"""Amplitude of the sine in counts unless the block's limits ask for less: 1 PN."""
+"""Amplitude of the sine in counts unless the block's limits require less: 1 PN."""
 UNRELIABLE_DB = 0.5
-"""A measured point is marked unreliable where the rounding of OUTPUT leaves its gain this uncertain, dB (decision)."""
+"""A point is marked unreliable if the rounding of OUTPUT makes its gain this uncertain, dB (decision)."""
 MOST_SCANS = 3_000_000
-"""Scans for one frequency, transient and window together; a slower one is not measured."""
+"""Most scans for one frequency, transient and window together; a slower one is not measured."""
 MOST_SCANS_IN_ALL = 8_000_000
 _WINDOW = 1000
-"""Least scans in the window: enough different phases that the roundings average out."""
+"""Fewest scans in the window: enough different phases that the roundings average out."""
 _SHARE = 0.9
-"""How much of the room up to a limit an amplitude that is chosen here takes."""
+"""Share of the distance to a limit that a chosen amplitude uses."""
 _LEFT = 1e-6
-"""What may be left of a transient when the window begins, as a share of it."""
+"""Share of a transient that may remain when the window starts."""
 
 
 @dataclass(frozen=True)
 class Measured:
     """The gain at one frequency: ``amplitude`` of the sine in counts, ``gain`` from it to OUTPUT.
 
-    ``uncertainty`` is the greatest error that the rounding of OUTPUT can make, as a gain. ``touched`` says what the
-    block ran into: then the point is not the linear function's.
+    ``uncertainty`` is the greatest error that the rounding of OUTPUT can make, as a gain. ``touched`` lists the limits
+    that the block reached: then the point is not that of the linear function.
     """
 
     rad_s: float
@@ -44,28 +44,28 @@ class Measured:
 
     @property
     def uncertainty_db(self) -> float:
-        """The uncertainty upwards in dB, infinite where nothing came through."""
+        """The uncertainty upwards in dB, infinite for a gain of 0."""
         return 20.0 * math.log10(1.0 + self.uncertainty / abs(self.gain)) if self.gain else math.inf
 
     @property
     def uncertainty_deg(self) -> float:
-        """The uncertainty of the phase in degrees, 180 where nothing is known of it."""
+        """The uncertainty of the phase in degrees, 180 if it is not known at all."""
         share = self.uncertainty / abs(self.gain) if self.gain else 1.0
         return math.degrees(math.asin(share)) if share < 1.0 else 180.0
 
     @property
     def reliable(self) -> bool:
-        """Whether the point can be compared with the design: enough counts, and nothing in the way."""
+        """Whether the point can be compared with the design: enough counts, and no limit reached."""
         return self.uncertainty_db < UNRELIABLE_DB and not self.touched
 
 
 class Sweep:
-    """Measures a block at one frequency after the other, from high to low, as long as its scans last."""
+    """Measures a block at one frequency after the other, from high to low, while its scans last."""
 
     def __init__(
         self, block: Block, period_ns: int, parameters: Mapping[str, Value], transfer: Transfer, amplitude: int | None
     ) -> None:
-        """Take the block with its parameters by keyword, and an amplitude in counts, None to choose one by frequency.
+        """Create from the block, its parameters by keyword, and an amplitude in counts, None to choose it by frequency.
 
         ``transfer`` is the block's own, for the length of transients and for amplitudes.
         """
@@ -75,10 +75,10 @@ class Sweep:
         self._settling = settling_scans(transfer)
 
     def measure(self, frequencies: Iterable[float]) -> list[Measured | None]:
-        """Return the gain at each frequency in rad/s, above 0 and below Nyquist, in the order in which they came.
+        """Return the gain at each frequency in rad/s, above 0 and below Nyquist, in the order given.
 
-        None stands for one that would take too many scans. The frequency measured at is the nearest with whole periods
-        in the window, at most 1/1000 away.
+        None means that it would take too many scans. The frequency measured at is the nearest with whole periods in the
+        window, at most 1/1000 away.
         """
         wanted = list(frequencies)
         found: dict[int, Measured | None] = {}
@@ -113,7 +113,7 @@ class Sweep:
         )
 
     def _fitting_amplitude(self, rad_s: float) -> int:
-        """Return the amplitude with which neither OUTPUT nor the integrator comes near to a limit."""
+        """Return an amplitude that keeps OUTPUT and the integrator away from their limits."""
         most = float(NORMAL_AMPLITUDE)
         gain = abs(self._transfer.discrete_response(rad_s))
         if gain > 0.0:
@@ -128,7 +128,7 @@ class Sweep:
 
 
 def _before(wave: list[int], scans: int) -> Iterator[int]:
-    """Return the scans before a window, in which the sine goes on as in it."""
+    """Return the scans before a window, in which the sine is continued backwards."""
     whole, rest = divmod(scans, len(wave))
     return chain(wave[len(wave) - rest :], chain.from_iterable(repeat(wave, whole)))
 
@@ -158,16 +158,16 @@ def integral_gain(transfer: Transfer) -> float:
 def rounding_error(amplitude: float, scans: int) -> float:
     """Return the greatest error in counts of the fundamental of a sine rounded to whole counts, over this many scans.
 
-    The roundings of a sine of ``a`` counts have the fundamental sum over k of 2 J1(2 pi k a) / (pi k), at most
-    0.53 / sqrt(a); what single scans miss of it adds 1.22 / sqrt(scans), three standard deviations. That of any error
-    within half a count is at most 2 / pi.
+    The roundings of a sine of ``a`` counts have the fundamental sum over k of 2 J1(2 pi k a) / (pi k), at most 0.53 /
+    sqrt(a); a finite number of scans adds 1.22 / sqrt(scans), three standard deviations. That of any error within half
+    a count is at most 2 / pi.
     """
     most = 2.0 / math.pi
     return min(most, 0.53 / math.sqrt(amplitude) + 1.22 / math.sqrt(scans)) if amplitude > 0.0 else most
 
 
 def whole_periods(rad_s: float, period_s: float) -> tuple[int, int]:
-    """Return periods and scans of a window in which a sine ends as it began, without an earlier repetition."""
+    """Return periods and scans of a window in which a sine ends where it started, without an earlier repetition."""
     turns_a_scan = rad_s * period_s / (2.0 * math.pi)
     turns = _prime_from(math.ceil(turns_a_scan * _WINDOW))
     window = max(round(turns / turns_a_scan), 2 * turns + 1)
@@ -184,7 +184,7 @@ def _prime_from(number: int) -> int:
 def whole_counts(amplitude: int, turns: int, window: int, first: int) -> list[int]:
     """Return a window of a sine in whole counts, whose sum is exactly 0, so that no integrator drifts away.
 
-    ``first`` is the phase with which it begins, as a part of ``window``.
+    ``first`` is the phase at its start, as a part of ``window``.
     """
     half = [round(amplitude * math.sin(2.0 * math.pi * place / window)) for place in range((window + 1) // 2)]
     middle = [0] if window % 2 == 0 else []
@@ -193,7 +193,7 @@ def whole_counts(amplitude: int, turns: int, window: int, first: int) -> list[in
 
 
 def settling_scans(transfer: Transfer) -> int:
-    """Return the scans until a transient has died out; an integrator keeps its offset, which no sine sees."""
+    """Return the scans until a transient has died out; an integrator keeps its offset, which no sine contains."""
     c = transfer.mapping
     poles = [root for root in roots(transfer.denominator) if root] if c is not None else []
     slowest = max((abs((c + pole) / (c - pole)) for pole in poles if c is not None), default=0.0)
@@ -236,9 +236,9 @@ def decibels(gain: complex) -> float | None:
 
 
 def phases(gains: Sequence[complex], start_deg: float | None) -> list[float]:
-    """Return phases in degrees of gains in the order of frequency, without jumps, from near ``start_deg`` on.
+    """Return phases in degrees of gains in the order of frequency, without jumps, starting near ``start_deg``.
 
-    None leaves each between -180 and 180, as for a notch, which jumps by itself.
+    None leaves each between -180 and 180, as for a notch, whose phase jumps.
     """
     found: list[float] = []
     last = start_deg
@@ -255,19 +255,19 @@ def nearest_phase(angle: float, to: float) -> float:
 
 
 def first_phase(transfer: Transfer) -> float | None:
-    """Return the phase in degrees at frequency 0, where ``phases`` begins: 90 for each zero at s = 0 less each pole."""
+    """Return the phase in degrees at frequency 0, where ``phases`` starts: 90 for each zero at s = 0 less each pole."""
     if any(abs(root.real) < 1e-6 * abs(root) for root in roots(transfer.numerator) if abs(root) > 0.0):
         return None
     return 90.0 * (_zeros_at_0(transfer.numerator) - _zeros_at_0(transfer.denominator))
 
 
 def _zeros_at_0(polynomial: Sequence[float]) -> int:
-    """Return how many of the last factors are 0."""
+    """Return the number of trailing factors that are 0."""
     return next((count for count, factor in enumerate(reversed(polynomial)) if factor), 0)
 
 
 def _components(given: Sequence[float], came: Sequence[float], turns: int) -> tuple[complex, complex]:
-    """Return the sums of two signals over their window times exp(-j w n); a mean has no share in them."""
+    """Return the sums of two signals over their window times exp(-j w n); a mean does not contribute."""
     window = len(given)
     table = [2.0 * math.pi * place / window for place in range(window)]
     real = imaginary = real_out = imaginary_out = 0.0

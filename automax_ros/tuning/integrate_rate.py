@@ -1,4 +1,4 @@
-"""The answer of ``automax tune-info --ki``: the KI of an INTEGRATE that gains this many counts per second (42.3)."""
+"""The result of ``automax tune-info --ki``: the KI of an INTEGRATE for a number of counts per second (42.3)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Rate:
 
     @classmethod
     def of(cls, y: float, x: float, period_s: float | None) -> Rate:
-        """Return the rate with its KI, checked against the limits at the scan time, without one against those of all.
+        """Return the rate with its KI, checked against the limits at the scan time, without one against those at any.
 
         Raises:
             RateFault: not numbers, Y or INPUT 0, INPUT beyond 16 bits, KI not above 0, or beyond its limits.
@@ -65,7 +65,7 @@ class Rate:
 
     @property
     def text(self) -> str:
-        """The REAL constant to write, without an exponent where that is readable."""
+        """The REAL constant to write, without an exponent if that is readable."""
         text = f"{self.constant:.{_DIGITS}g}"
         if "e" in text:
             return text.upper().replace("E", ".0E") if "." not in text else text.upper()
@@ -77,7 +77,7 @@ class Rate:
         return None if self.period_s is None else range_of(self.ki * self.period_s / (2.0 * RATE_FACTOR), "KI / C")
 
     def report(self) -> str:
-        """Return the answer as an engineer reads it."""
+        """Return the result as text."""
         lines = [
             f"INTEGRATE, {self.y:g} counts/s at a constant INPUT of {self.x:g} counts, WM not programmed",
             f"  KI            (pi/20) / tan(pi/20) Y/X = {RATE_FACTOR:.7f} x {self.y / self.x:.7g} = {self.ki:.7g}",
@@ -107,7 +107,7 @@ class Rate:
         return "\n".join(lines) + "\n"
 
     def record(self) -> dict[str, object]:
-        """Return the answer for ``--json``."""
+        """Return the result for ``--json``."""
         found = self.range
         limits = None if self.period_s is None else rate_limits(self.period_s)
         return {
@@ -131,7 +131,7 @@ class Rate:
         return verdict_of(stored_real(self.constant)[0], *limits)
 
     def _require_possible(self, period_s: float | None) -> None:
-        """Refuse a KI beyond its limits; those of the longest and of the shortest scan where none is known."""
+        """Refuse a KI beyond its limits; without a scan time, those of the longest and of the shortest scan."""
         when = "at any scan time"
         low, high = rate_limits(_LONGEST_S)[0], rate_limits(_SHORTEST_S)[1]
         if period_s is not None:

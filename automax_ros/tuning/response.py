@@ -1,4 +1,4 @@
-"""What ``automax response`` measures of a block, and what stands next to it."""
+"""The results of ``automax response``: measurements of a block, with its discrete and Laplace functions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from automax_ros.tuning.step_response import StepResponse, laplace_step, respond
 from automax_ros.tuning.tuning import Tuning
 
 _SAME = 1e-3
-"""Frequencies nearer to each other than this share count as one."""
+"""Frequencies that differ by less than this share count as one."""
 _BETWEEN = 24
 """Frequencies between two points of a curve, so that phases can be followed without a jump."""
 
@@ -39,7 +39,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Point:
-    """One frequency: ``mark`` names a corner or WM there; ``measured`` is None where it would take too many scans.
+    """One frequency: ``mark`` names a corner or WM there; ``measured`` is None if it would take too many scans.
 
     Gains are complex at ``rad_s``, phases in degrees without jumps.
     """
@@ -95,7 +95,7 @@ def measured_response(
     scans: int,
     assumed: Sequence[str],
 ) -> BlockResponse:
-    """Run a block for both responses; it has a transfer function."""
+    """Measure both responses of a block, which must have a transfer function."""
     transfer = tuning.transfer
     assert transfer is not None
     wanted = _frequencies(frequencies, tuning)
@@ -114,7 +114,7 @@ def measured_response(
 
 
 def marked_frequencies(tuning: Tuning) -> list[tuple[str, float]]:
-    """Return names and frequencies of the corners below Nyquist and of a mapping frequency of its own."""
+    """Return names and frequencies of the corners below Nyquist and of a separate mapping frequency."""
     found = [(corner.name, corner.rad_s) for corner in tuning.corners if corner.discrete is not None]
     own = tuning.declared.dynamics.exact_at
     if own in tuning.values and own not in (corner.name for corner in tuning.corners):
@@ -136,7 +136,7 @@ def followed(transfer: Transfer, frequencies: Sequence[float], *, laplace: bool)
 
 
 def _frequencies(wanted: Range, tuning: Tuning) -> list[tuple[float, str]]:
-    """Return the frequencies in rising order, those of corners and WM put in with their names."""
+    """Return the frequencies in rising order, with those of corners and WM inserted under their names."""
     found = [(rad_s, "") for rad_s in logarithmic(wanted.low, wanted.high, wanted.points)]
     for name, rad_s in marked_frequencies(tuning):
         if not wanted.low * (1.0 - _SAME) <= rad_s <= wanted.high * (1.0 + _SAME):
@@ -149,7 +149,7 @@ def _frequencies(wanted: Range, tuning: Tuning) -> list[tuple[float, str]]:
 
 
 def _points(transfer: Transfer, wanted: Sequence[tuple[float, str]], found: Sequence[Measured | None]) -> list[Point]:
-    """Return the points; what stands next to a measurement holds at the very frequency it was made at."""
+    """Return the points; the functions of a measured point hold at the very frequency of the measurement."""
     exact = [item.rad_s if item is not None else rad_s for (rad_s, _), item in zip(wanted, found, strict=True)]
     order = sorted(range(len(exact)), key=lambda place: exact[place])
     rising = [exact[place] for place in order]

@@ -15,7 +15,7 @@ from automax_ros.tuning.frequency import NORMAL_AMPLITUDE, integral_gain, roots
 MOST_SCANS = 500_000
 """Longest step response, in executions of the block."""
 SETTLED = 0.02
-"""Share of its way by which a settled response may still be off its final value; at least one count."""
+"""Share of its way by which a settled response may deviate from its final value; at least one count."""
 _TIME_CONSTANTS = 8.0
 _FEWEST_SCANS = 20
 _SHARE = 0.9
@@ -25,11 +25,11 @@ Matrix = list[list[float]]
 
 @dataclass(frozen=True)
 class StepResponse:
-    """The outputs from scan 0, in which the step comes, on: a value each ``period_s``, in counts.
+    """The outputs from scan 0, in which the step comes, on: one value per ``period_s``, in counts.
 
-    ``rest`` is OUTPUT before the step, ``final`` where the discrete function ends, None for one that goes on (an
-    integrator). ``touched`` says what the block ran into, nothing where OUTPUT is the design's within a count: to
-    settle at a limit is not to run into it.
+    ``rest`` is OUTPUT before the step, ``final`` the end value of the discrete function, None if it has none (an
+    integrator). ``touched`` lists the limits that the block reached, none if OUTPUT is the design's within a count:
+    settling at a limit does not count.
     """
 
     counts: int
@@ -42,7 +42,7 @@ class StepResponse:
 
     @property
     def overshoot(self) -> float | None:
-        """How far OUTPUT goes beyond its final value, as a share of its way there; None where it ends where it was."""
+        """How far OUTPUT exceeds its final value, as a share of its way there; None if it ends where it started."""
         if self.final is None or abs(self.final - self.rest) < 0.5:
             return None
         return max(0.0, max((value - self.rest) / (self.final - self.rest) for value in self.output) - 1.0)
@@ -55,7 +55,7 @@ class StepResponse:
 
     @property
     def settling_s(self) -> float | None:
-        """The time from which OUTPUT stays within the band, in s; None where it does not, or has no final value."""
+        """The time from which OUTPUT stays within the band, in s; None if it does not, or has no final value."""
         if self.final is None:
             return None
         band = self.band
@@ -124,7 +124,7 @@ def laplace_step(transfer: Transfer, times_s: Iterable[float]) -> list[float]:
     """
     direct, rest, monic = _proper(transfer.numerator, transfer.denominator)
     order = len(monic) - 1
-    # Frequencies count from the function's own scale, so that no element is far larger than the others.
+    # Frequencies are relative to the function's own scale, so that no element is far larger than the others.
     scale = max((abs(root) for root in roots(monic)), default=0.0) or 1.0
     companion: Matrix = [[0.0] * (order + 1) for _ in range(order + 1)]
     for row in range(order - 1):

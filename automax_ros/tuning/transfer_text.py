@@ -11,11 +11,11 @@ from automax_ros.tuning.tuning import Tuning
 
 _FEWEST, _MOST = 7, 17
 _TRUE_DIGITS = 1e-5
-"""How far the response of the rounded coefficients may be off, as a share."""
+"""Most deviation of the response of the rounded coefficients, as a share."""
 
 
 def number(value: float, digits: int = 6) -> str:
-    """Return a number with at most this many digits, with an exponent only where it is very large or small."""
+    """Return a number with at most this many digits, with an exponent only if it is very large or small."""
     return f"{value:.{digits}g}"
 
 

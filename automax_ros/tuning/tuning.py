@@ -1,4 +1,4 @@
-"""What the coefficients of a dynamic block mean at a scan period: corners, limits as numbers, range (41 to 51)."""
+"""The coefficients of a dynamic block at a scan period: corners, limits as numbers, range (41 to 51)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RANGE_EDGES = (0.125, 0.25)
 
 
 class Verdict(enum.Enum):
-    """Where a value lies between its limits."""
+    """Position of a value between its limits."""
 
     UNKNOWN = "unknown"
     WITHIN = "within"
@@ -41,8 +41,8 @@ class Verdict(enum.Enum):
 class LimitNow:
     """The limits of one parameter as numbers at a scan period, in its own unit; one that cannot be known is None.
 
-    ``value`` is what the CALL gives or the default, before it is limited; ``given`` says which of the two. A default
-    is not limited. Where the limits cross the high one is both.
+    ``value`` is from the CALL or the default, before it is limited; ``given`` is TRUE if it is from the CALL. A default
+    is not limited. If the limits cross, both are the high one.
     """
 
     parameter: str
@@ -58,11 +58,11 @@ class LimitNow:
 
 @dataclass(frozen=True)
 class Corner:
-    """A frequency at which a transfer function bends: ``rad_s`` as the Laplace function has it.
+    """A frequency at which a transfer function bends: ``rad_s`` is that of the Laplace function.
 
-    ``mapped_rad_s`` is where the discrete function has the value that Laplace's has at the corner; None where the
-    block is not made by a mapping (PID). ``discrete`` is None at or above the Nyquist frequency. ``laplace`` and
-    ``discrete`` are gains at ``rad_s``.
+    At ``mapped_rad_s`` the discrete function has the value of the Laplace function at the corner; None if the block is
+    not made by a mapping (PID). ``discrete`` is None at or above the Nyquist frequency. ``laplace`` and ``discrete``
+    are gains at ``rad_s``.
     """
 
     name: str
@@ -83,13 +83,13 @@ class Corner:
 
     @property
     def warping(self) -> float | None:
-        """How far the mapping moves the corner, as a share of it; below 0 towards lower frequencies."""
+        """Shift of the corner by the mapping, as a share of it; below 0 towards lower frequencies."""
         return None if self.mapped_rad_s is None else self.mapped_rad_s / self.rad_s - 1.0
 
 
 @dataclass(frozen=True)
 class IntegratorRange:
-    """Section 51: the coefficient Kx with its formula, the range in counts, the edge of Kx that is close if one is."""
+    """Section 51: the coefficient Kx with its formula, the range in counts, and a near edge of Kx if any."""
 
     kx: float
     formula: str
@@ -131,7 +131,7 @@ class Tuning:
 
     @property
     def declared(self) -> Coefficients:
-        """What the block declares of its coefficients."""
+        """The block's declaration of its coefficients."""
         assert self.block.coefficients is not None
         return self.block.coefficients
 
@@ -142,7 +142,7 @@ class Tuning:
 
     @property
     def equation(self) -> str:
-        """What the block executes, in the terms of its coefficients; nothing may be missing."""
+        """The equation that the block executes, in the terms of its coefficients; nothing may be missing."""
         return self.declared.dynamics.equation(self.values)
 
     @property
@@ -157,7 +157,7 @@ class Tuning:
 
 
 def tuning(block: Block, scan_s: float, given: Mapping[str, float | None]) -> Tuning:
-    """Return what the parameters of a block mean; the block has coefficients.
+    """Return the tuning of a block with coefficients from its parameters.
 
     ``given`` has the parameters that the CALL programs, None for one whose value is not known.
     """
@@ -196,9 +196,9 @@ def tuning(block: Block, scan_s: float, given: Mapping[str, float | None]) -> Tu
 
 
 def verdict_of(value: float, low: float | None, high: float | None) -> Verdict:
-    """Return where a value lies: near is within NEAR of a limit, on the limit's own scale; 0 has no scale.
+    """Return the position of a value: near is within NEAR of a limit, on the limit's own scale; 0 has no scale.
 
-    A side that is not known (None) is not judged; UNKNOWN is a value that is neither beyond nor near the other.
+    A limit that is not known (None) is not judged; UNKNOWN is a value that is neither beyond nor near the other.
     """
     if not is_within(value, -math.inf if low is None else low, math.inf if high is None else high):
         return Verdict.ABOVE if high is not None and value > high else Verdict.BELOW

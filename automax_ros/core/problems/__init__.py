@@ -1,8 +1,8 @@
 """The table of problems: every code that a check, a rack or a running task can report.
 
-Codes are ours, ``AMXnnnn``, in bands: 0 lexing and syntax, 2 types, 4 meaning of declarations, statements and blocks,
-6 files, racks and bags, 7 run time. Where the hardware's own code is known it is given too.
-Each code has a page in ``core/pages``, which ``automax explain`` prints.
+Codes are ours, ``AMXnnnn``, in bands: 0 lexing and syntax, 2 types, 4 meaning of declarations, statements and blocks, 6
+files, racks and bags, 7 run time. If the hardware's own code is known it is given too. Each code has a page in
+``core/pages``, which ``automax explain`` prints.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6491", "no interrupt line for a current minor loop"),
     Problem("AMX6492", "task that goes before a current minor loop", Severity.WARNING),
     Problem("AMX6493", "register of a 57C406 in a control-block task", Severity.WARNING),
-    # rack files and tasks: what looks forgotten
+    # rack files and tasks: omissions
     Problem("AMX6495", "common written by two tasks", Severity.WARNING),
     Problem("AMX6496", "common that is read and never written", Severity.WARNING),
     Problem("AMX6497", "common that no task uses", Severity.WARNING),

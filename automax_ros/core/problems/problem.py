@@ -1,4 +1,4 @@
-"""What one row of the table of problems holds."""
+"""A row of the table of problems."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Severity(enum.Enum):
 class Problem:
     """One kind of problem.
 
-    ``title`` is a short phrase in lower case; ``hardware`` is the code the real rack shows, where it is known.
+    ``title`` is a short phrase in lower case; ``hardware`` is the code the real rack shows, if it is known.
     """
 
     code: str

@@ -1,4 +1,4 @@
-"""Problems of run time (7xxx): what a task's error log holds, and what stops a rack."""
+"""Problems of run time (7xxx): the codes of a task's error log, and the causes of a STOP ALL."""
 
 from __future__ import annotations
 

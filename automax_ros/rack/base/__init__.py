@@ -1,1 +1,1 @@
-"""What the parts of a running rack share: observers, views of memory, why it stopped."""
+"""Shared by the parts of a running rack: observers, views of memory, the cause of a stop."""

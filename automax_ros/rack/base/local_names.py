@@ -32,7 +32,7 @@ class LocalElement:
 
     @property
     def why_not_forced(self) -> str | None:
-        """Why it cannot be forced, None where it can: a simple local of any type but STRING (J2-3106-1 p. 18-10)."""
+        """Why it cannot be forced; None for a simple local of any type but STRING (J2-3106-1 p. 18-10)."""
         if self.symbol.dimensions:
             return "it is an element of an array"
         if self.symbol.tuning is not None:
@@ -41,10 +41,10 @@ class LocalElement:
 
 
 def local_named(tasks: Iterable[Task], name: str) -> LocalElement:
-    """Return what a name with its task means; case and blanks do not matter.
+    """Return the variable that ``TASK.NAME`` means; case and blanks do not matter.
 
     Raises:
-        NameFault: there is no such task, or it has no such variable of its own.
+        NameFault: the rack has no such task, or the task no such variable of its own.
     """
     owner, _, own = name.partition(".")
     known = {task.name: task for task in tasks}

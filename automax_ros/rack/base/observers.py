@@ -1,4 +1,4 @@
-"""Those who are told what happens in a rack, in order: streams, nodes, tests."""
+"""Observers of a rack, called in order: streams, nodes, tests."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Task
 
 HALT, STEP, RESUME = "pause", "step", "resume"
-"""Operations that concern time alone: they leave every task as it was."""
+"""Operations on rack time alone: they change no task."""
 _ON_TIME = frozenset({HALT, STEP, RESUME})
 
 
 @dataclass(frozen=True)
 class Operation:
-    """Something that was done to a rack: ``what`` as stimuli files call it, ``task`` where it concerns one.
+    """An operation on a rack: ``what`` as in stimuli files, ``task`` if it concerns one.
 
-    ``ok`` is FALSE where it was refused; ``reason`` says why, or what was the cause. ``detail`` is what was asked for
-    besides: ``REF% = 200`` of a force.
+    ``ok`` is FALSE if it was refused; ``reason`` gives the reason of the refusal, or the cause. ``detail`` is the rest
+    of the request: ``REF% = 200`` of a force.
     """
 
     at_ns: int
@@ -30,15 +30,15 @@ class Operation:
     detail: str = ""
 
     def concerns(self, task: str) -> bool:
-        """Return whether a task may be another after it; ``task`` of a STOP ALL is only the one that caused it."""
+        """Return whether it may change a task; ``task`` of a STOP ALL is only the one that caused it."""
         return self.what not in _ON_TIME and (self.task in ("", task) or self.what == "stop_all")
 
 
 class RackObserver(Protocol):
-    """Somebody who is told what happens in a rack, in order."""
+    """Receives all that happens in a rack, in order."""
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
-        """A task has scanned (or, as scan 0, executed what stands before SCAN_LOOP), with its writes to memory."""
+        """A task has executed a scan, or its part before SCAN_LOOP as scan 0, with these writes to memory."""
         ...
 
     def written(self, writes: list[WriteGroup]) -> None:
@@ -55,38 +55,38 @@ class RackObserver(Protocol):
 
 
 class Observers:
-    """All observers of one rack; they get writes in the order in which they happened."""
+    """All observers of one rack; they receive writes in the order in which they happened."""
 
     def __init__(self, memory: CommonMemory) -> None:
-        """Begin with none."""
+        """Create a list without observers."""
         self._memory = memory
         self._all: list[RackObserver] = []
 
     def add(self, observer: RackObserver) -> None:
-        """Tell an observer everything from now on; the write log is kept from then on."""
+        """Add an observer, and keep the write log from now on."""
         self._all.append(observer)
         self._memory.keep_log()
 
     def scanned(self, task: Task, record: ScanRecord) -> None:
-        """Tell of a scan and of its writes."""
+        """Report a scan and its writes."""
         writes = self._memory.take_writes()
         for observer in self._all:
             observer.scanned(task, record, writes)
 
     def tell_writes(self) -> None:
-        """Tell of writes that no scan has made."""
+        """Report writes that were not made by a scan."""
         writes = self._memory.take_writes()
         if writes:
             for observer in self._all:
                 observer.written(writes)
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """Tell that a tunable was set, or a local forced or released."""
+        """Report that a tunable was set, or a local forced or released."""
         for observer in self._all:
             observer.tuned(task, now_ns)
 
     def operated(self, operation: Operation) -> None:
-        """Tell of an operation, after the writes that belong to it."""
+        """Report an operation, after the writes that belong to it."""
         self.tell_writes()
         for observer in self._all:
             observer.operated(operation)

@@ -1,7 +1,8 @@
-"""The part of a rack that is in one process: all of it, or some modules of a rack that is distributed.
+"""The part of a rack that is in one process: the whole rack, or some modules of a distributed one.
 
-Tasks, plants and modules of the part live here; of the others there are the registers, which the bus fills
-(``rack/bus``). Variables, writers and everything else that has numbers are those of the whole rack in every process.
+A part has the tasks and plants of its modules; of other modules it has only the registers, which come over the bus
+(``rack/distributed``). Variables, writers and everything else with a number are those of the whole rack in every
+process.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class RackPart:
 
     @classmethod
     def of(cls, config: RackConfig, slots: Collection[int] | None) -> RackPart:
-        """Return the part with the modules of some slots, the whole rack for None.
+        """Return the part with the modules in ``slots``, or the whole rack for None.
 
         Raises:
             ValueError: a slot is empty.
@@ -45,7 +46,7 @@ class RackPart:
 
     @property
     def holds_common_memory(self) -> bool:
-        """Whether common memory is in this process: it serves the rack's commons, tables and operators."""
+        """Whether common memory is in this process, which then serves the rack's commons, tables and operators."""
         return self.config.common_memory_slot in self.slots
 
     @property
@@ -59,7 +60,7 @@ class RackPart:
         return [task.name for module in self.modules for task in module.tasks]
 
     def is_elsewhere(self, what: str | int) -> bool:
-        """Whether a task or a plant by its name, or a module by its slot, is in another process."""
+        """Return whether a task or plant (by name) or a module (by slot) is in another process."""
         return what in self._elsewhere
 
     @cached_property
@@ -68,7 +69,7 @@ class RackPart:
 
     @property
     def _names(self) -> frozenset[str | int]:
-        """What is here: tasks and plants by name, modules by slot."""
+        """Names of the tasks and plants, and slots of the modules, in this process."""
         return frozenset[str | int]([*self.slots, *self.tasks, *(plant.name for plant in self.plants)])
 
     @cached_property
@@ -78,9 +79,9 @@ class RackPart:
 
     @property
     def plants(self) -> list[PlantConfig]:
-        """The plants that its drives turn with all that is coupled to them, in the order of the file.
+        """The plants that its drives turn and all plants coupled to them, in the order of the file.
 
-        Those that no drive turns are where common memory is (decision).
+        Plants that no drive turns are in the process with common memory (decision).
         """
         coupled = _coupled(self.config.plants)
         slots = {item.name: item.slot for item in driven_plants(self.config)}
@@ -92,7 +93,7 @@ class RackPart:
         return found
 
     def elsewhere(self, memory: CommonMemory, backplane: Backplane) -> frozenset[tuple[int, int]]:
-        """Return the views and elements of modules in other processes: what becomes of them is decided there."""
+        """Return the views and elements of modules in other processes, which decide on their values."""
         found: set[tuple[int, int]] = set()
         for module in self.config.modules:
             bank = backplane.bank(module.slot)
@@ -102,7 +103,7 @@ class RackPart:
 
 
 def _coupled(plants: Sequence[PlantConfig]) -> dict[str, set[str]]:
-    """Return, for each plant, those whose shafts turn with its own, itself among them."""
+    """Return, for each plant, the plants whose shafts turn with its own, itself included."""
     groups = {plant.name: {plant.name} for plant in plants}
     for plant in plants:
         if plant.couple is not None:

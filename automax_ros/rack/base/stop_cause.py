@@ -1,11 +1,11 @@
-"""How a rack stands after what was done to it: powered, stopped by what, which tasks ran."""
+"""Operating state of a rack: power, the cause of a stop, the tasks that ran."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 STOP_ALL = "STOP ALL"
-"""How the line of a stop begins."""
+"""Start of the text for a stop."""
 
 
 KEEP_STATE = "keep_state"
@@ -18,7 +18,7 @@ class OperationRefused(Exception):
 
 @dataclass(frozen=True)
 class StopCause:
-    """What stopped all tasks: ``code`` is the hardware's, None where none is known, ``task`` who caused it, or ""."""
+    """Cause of a STOP ALL: ``code`` is the hardware's or None, ``task`` the one that caused it or ""."""
 
     time_ns: int
     reason: str
@@ -27,18 +27,18 @@ class StopCause:
 
     @property
     def title(self) -> str:
-        """What stands on a status line: STOP ALL, with the hardware's code where one is known."""
+        """Text for a status line: STOP ALL, with the hardware's code if one is known."""
         return STOP_ALL if self.code is None else f"{STOP_ALL} (code {self.code})"
 
     @property
     def is_fault(self) -> bool:
-        """Whether a fault stopped the rack: it has a code or a task, a command has neither."""
+        """Whether a fault stopped the rack: a fault has a code or a task, a command neither."""
         return self.code is not None or bool(self.task)
 
 
 @dataclass(frozen=True)
 class PowerReturn:
-    """When the power comes back by itself (ns), and whether the battery was good meanwhile."""
+    """When the power returns automatically (ns), and whether the battery is good until then."""
 
     at_ns: int
     battery: bool = True
@@ -46,9 +46,9 @@ class PowerReturn:
 
 @dataclass(frozen=True)
 class OperationsState:
-    """How a rack stands: all that its operations leave, apart from what tasks and memory hold.
+    """State that operations leave in a rack, apart from the state of tasks and memory.
 
-    ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that were taken out.
+    ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that were deleted.
     """
 
     powered: bool = True

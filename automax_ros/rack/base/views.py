@@ -1,4 +1,4 @@
-"""A rack's variables as views of memory, and the registers of its modules as the backplane finds them."""
+"""A rack's variables as views of memory, and the registers of its modules as banks of the backplane."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from automax_ros.runtime.memory.views import Place, ViewSpec
 
 
 def backplane_of(config: RackConfig) -> Backplane:
-    """Return where the registers of a rack's modules answer."""
+    """Return the backplane with the registers of a rack's modules."""
     banks = bank_views(config.variables)
     return Backplane(
         Bank(module.slot, banks[module.slot], module.registers.count, module.registers.writable)
@@ -20,12 +20,12 @@ def backplane_of(config: RackConfig) -> Backplane:
 
 
 def bank_views(variables: Iterable[CommonVariable]) -> dict[int, int]:
-    """Return the view of the registers of each slot that has some."""
+    """Return, for each slot with registers, their view."""
     return {variable.bank: view for view, variable in enumerate(variables) if variable.bank is not None}
 
 
 def view_specs(variables: Sequence[CommonVariable]) -> tuple[ViewSpec, ...]:
-    """Return what memory must know of a rack's variables, in their order."""
+    """Return the specifications of the views, in the order of the rack's variables."""
     banks = bank_views(variables)
     return tuple(
         ViewSpec(

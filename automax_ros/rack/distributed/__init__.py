@@ -1,1 +1,1 @@
-"""One process's part of a rack tied to the others."""
+"""Synchronizes the processes of a distributed rack."""

@@ -1,13 +1,14 @@
-"""Ties one process's part of a rack to the others: its writes go out, theirs come in, and all images agree.
+"""Synchronizes one process's part of a rack with the others: sends its writes, applies theirs; all images agree.
 
-The link observes the rack. What tasks, inputs and operators here write is noted with its version and put out as
-batches, one for each scan and writer; what comes from another process is written between two scans as far as it is
-newer. A scan that the host has made late writes with the instant of its deadline: where another process wrote the same
-after that, the other's value is put back (decision). A late scan does not see what was written elsewhere after its
-deadline, or by a scan with the same deadline: that is taken after it (decision).
+The link observes the rack. A write by a task, an input or an operator of this process is recorded with its version and
+sent in a batch, one per scan and writer. A write of another process is applied between two scans if it is newer than
+the value held. The writes of a scan that the host delayed count from its deadline: if another process wrote the same
+variable after that, the other's value is restored (decision). A late scan does not see what others wrote after its
+deadline, or in a scan with the same deadline: that is applied after it (decision).
 
-Presets are not sent, since every process writes them by itself. Neither is what stimuli do at the same rack time in
-every process (``is_common``), but for the home: a process that joins in the middle of a wave has it from there.
+Presets are not sent, since every process writes them. Nor are writes that stimuli make at the same rack time in every
+process (``is_common``), except by the process with common memory: a process that joins in the middle of a wave gets the
+wave's values from it.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ _FORCES = (WriteKind.FORCE, WriteKind.RELEASE)
 _BEFORE_SCANS = EventKey(EventClass.OUTSIDE, 2, "bus")
 _AFTER_SCANS = EventKey(EventClass.OBSERVE, 0, "bus")
 MOST_AHEAD_NS = 10 * NS_PER_S
-"""What comes from further ahead is taken at once (decision): a process that is later than this is lost."""
+"""A write from further ahead is applied at once (decision): a process that is later than this is lost."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Writes of one writer at one instant, in order: (view, element, value). ``seat`` is the process's that wrote."""
+    """Writes of one writer at one instant, in order: (view, element, value). ``seat`` is the process that wrote."""
 
     seat: int
     sequence: int
@@ -49,13 +50,13 @@ class Batch:
 
     @property
     def version(self) -> Version:
-        """From when its values count."""
+        """Version of its values."""
         return self.time_ns, self.seat, self.sequence
 
 
 @dataclass(frozen=True)
 class HeldForce:
-    """A force, or one that was released (``held`` FALSE), and from when that counts."""
+    """A force, or one that was released (``held`` FALSE), with its version."""
 
     view: int
     element: int
@@ -66,7 +67,7 @@ class HeldForce:
 
 @dataclass(frozen=True)
 class ImageCopy:
-    """All that was written since the rack's start, as one image holds it after its own batch ``sequence``."""
+    """All that was written since the rack's start, from one image after its own batch ``sequence``."""
 
     sequence: int
     values: tuple[VersionedValue, ...]
@@ -75,7 +76,7 @@ class ImageCopy:
 
 @dataclass(frozen=True)
 class StopState:
-    """How the whole rack stands: stopped for ``cause`` or not (None), and from when that counts."""
+    """Whether the whole rack is stopped, for ``cause``, or runs (None), and since when."""
 
     at_ns: int = 0
     seat: int = 0
@@ -83,16 +84,16 @@ class StopState:
 
     @property
     def order(self) -> tuple[int, int]:
-        """The greater one is true."""
+        """Sorts states: the greatest is valid."""
         return self.at_ns, self.seat
 
 
 class ImageSync:
-    """The link of one process. ``seat`` is the slot that names it; ``standing`` is how the rack stands as it knows it.
+    """The link of one process. ``seat`` is the slot that names it, ``standing`` the rack's stop state as known here.
 
-    ``send`` gets each batch as soon as it is there; it may not write to the rack. ``is_common`` says whether what
-    happens now happens in every process by itself. ``guard`` carries out what waited for its time, and deals with what
-    that raises: a damaged message of another process ends nothing.
+    ``send`` receives each batch immediately; it may not write to the rack. ``is_common`` returns whether every process
+    makes the present writes. ``guard`` executes writes that were deferred, and handles their exceptions: a damaged
+    message of another process must not end this one.
     """
 
     def __init__(
@@ -103,7 +104,7 @@ class ImageSync:
         is_common: Callable[[], bool] = lambda: False,
         guard: Callable[[Callable[[], None]], None] = lambda take: take(),
     ) -> None:
-        """Take the rack; nothing is observed yet."""
+        """Create the link of a rack; it does not observe the rack yet."""
         self._rack, self._memory, self.seat = rack, rack.memory, seat
         self._send, self._is_common, self._guard = send, is_common, guard
         self._versions = Versions(rack.memory.registers)
@@ -115,51 +116,51 @@ class ImageSync:
         self._waiting: dict[ScheduledEvent, Callable[[], None]] = {}
 
     def begin(self) -> None:
-        """Observe the rack, as the last of its observers, before it is started."""
+        """Observe the rack, as its last observer; called before the rack is started."""
         self._memory.keep_causes()
         self._rack.observe(self)
 
     # RackObserver
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
-        """Send what a scan has written."""
+        """Send the writes of a scan."""
         if writes:
             self._collect()
 
     def written(self, writes: list[WriteGroup]) -> None:  # noqa: ARG002
-        """Send what was written from outside the tasks."""
+        """Send writes that were not made by a scan."""
         self._collect()
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """Tunables and locals are the task's alone."""
+        """Do nothing: tunables and locals belong to one task."""
 
     def operated(self, operation: Operation) -> None:
-        """Note whether the rack stands otherwise than before."""
+        """Record that the rack was stopped or started."""
         cause = self._rack.operations.stopped
         if not self._adopting and cause != self.standing.cause:
-            # Two at one instant, or before the start, have their order too.
+            # Two at one instant, or before the start, have an order too.
             seat = self._rack.config.common_memory_slot if self._is_common() else self.seat
             self.standing = StopState(max(operation.at_ns, self.standing.at_ns + 1), seat, cause)
 
     # from other processes
 
     def receive(self, batch: Batch) -> None:
-        """Take over another process's writes, as far as they are newer than what is held. Between two scans.
+        """Apply another process's writes that are newer than the values held. Between two scans.
 
-        Where the host has made this process late, they are taken only after what it still has to do before them.
+        If the host delayed this process, they are applied only after the scans that are due before them.
         """
-        # What start-up parts write at the start of the rack is there before the first scans.
+        # Writes of start-up parts at the start of the rack are applied before the first scans.
         by_scan = batch.kind is WriteKind.COMMIT or (batch.kind is WriteKind.BASIC and batch.time_ns > 0)
         key = _AFTER_SCANS if by_scan else _BEFORE_SCANS
         self._in_time(batch.time_ns, key, lambda: self._receive(batch))
 
     def merge(self, picture: ImageCopy) -> None:
-        """Take over what another process holds, as far as it is newer. Between two scans, in time as ``receive``."""
+        """Apply the values of another process's image that are newer. Between two scans, deferred as in ``receive``."""
         written_ns = [held.version[0] for held in picture.values] + [force.version[0] for force in picture.forces]
         self._in_time(max(written_ns, default=0), _BEFORE_SCANS, lambda: self._merge(picture))
 
     def picture(self) -> ImageCopy:
-        """Return all that was written, for a process that joins or has missed a batch."""
+        """Return all that was written, for a process that joins or missed a batch."""
         self._collect()
         forces = (
             HeldForce(view, element, value, held, version)
@@ -168,16 +169,16 @@ class ImageSync:
         return ImageCopy(self.sequence, tuple(self._versions.all()), tuple(forces))
 
     def take_waiting(self) -> None:
-        """Take at once what waits for its time: nothing that was written is lost where the rack or its run ends."""
+        """Apply deferred writes immediately: none is lost when the rack or its run ends."""
         waiting, self._waiting = self._waiting, {}
         for event, take in waiting.items():
             event.cancel()
             self._guard(take)
 
     def last_of(self, seat: int) -> ImageCopy:
-        """Return what a process has written within the last second, as this image holds it, for all others.
+        """Return what a process wrote within the last second, as held in this image, for all other processes.
 
-        Where it has ended in the middle of sending some have its last batch and others do not.
+        If the process ended while it sent, some of them have its last batch and others do not.
         """
         self.take_waiting()
         whole, since_ns = self.picture(), self._rack.now_ns - NS_PER_S
@@ -186,9 +187,9 @@ class ImageSync:
         return ImageCopy(whole.sequence, values, forces)
 
     def adopt(self, standing: StopState) -> None:
-        """Follow the rack into how it stands by another process's word, if that is newer. Between two scans.
+        """Adopt another process's stop state if it is newer. Between two scans.
 
-        A part that stands already is not stopped again, which would clear what was set meanwhile (decision).
+        A part that is stopped already is not stopped again, which would clear what was set meanwhile (decision).
         """
         if standing.order <= self.standing.order:
             return
@@ -207,7 +208,7 @@ class ImageSync:
             self._adopting = False
 
     def _in_time(self, time_ns: int, key: EventKey, take: Callable[[], None]) -> None:
-        """Take what was written at a time: now, or where this process is late, after what it has to do before that."""
+        """Apply writes made at ``time_ns``: now, or if this process is late, after what is due before that."""
         scheduler = self._rack.scheduler
         due = scheduler.next_ns
         is_late = due is not None and (due < time_ns or (due == time_ns and key is _AFTER_SCANS))
@@ -230,7 +231,7 @@ class ImageSync:
         self._tell()
 
     def _tell_shaped(self, batch: Batch) -> None:
-        """Send back what an input has made something else of, as a counter of 24 bits does: all shall hold that."""
+        """Send back values that an input changed, as a counter of 24 bits does: all images must hold them."""
         sent = {(view, element): value for view, element, value in batch.entries}
         for cause in self._memory.take_causes():
             entry = cause.view, cause.element, cause.value
@@ -268,7 +269,7 @@ class ImageSync:
             self._write(held.view, held.element, value, PRESET_WRITER, WriteKind.OUTSIDE)
 
     def _fitting(self, view: int, element: int, value: Value) -> Value | None:
-        """Return a value as its variable holds it; None where there is no such: what comes may be damaged."""
+        """Return a value as its variable holds it; None if it does not fit: a message may be damaged."""
         if not 0 <= view < len(self._memory.specs):
             return None
         try:
@@ -297,14 +298,14 @@ class ImageSync:
             self._memory.release(force.view, force.element, writer)
 
     def _tell(self) -> None:
-        """Let observers know what has come, without sending it back."""
+        """Report received writes to observers, without sending them back."""
         self._memory.take_causes()
         self._rack.observers.tell_writes()
 
     # to other processes
 
     def _collect(self) -> None:
-        """Note and send what was written here since the last time."""
+        """Record and send what was written here since the last call."""
         causes = self._memory.take_causes()
         for (time_ns, writer, kind), group in groupby(causes, key=lambda write: write[1:4]):
             entries = tuple((write.view, write.element, write.value) for write in group)
@@ -316,7 +317,7 @@ class ImageSync:
         sends = not preset and (not common or self._rack.part.holds_common_memory)
         if sends:
             self.sequence += 1
-        if self._adopting:  # what a STOP ALL clears here is not older than the STOP ALL
+        if self._adopting:  # values that a STOP ALL clears here are not older than the STOP ALL
             time_ns = max(time_ns, self.standing.at_ns)
         home = self._rack.config.common_memory_slot
         version = AS_INSTALLED if preset else (time_ns, home, 0) if common else (time_ns, self.seat, self.sequence)
@@ -335,7 +336,7 @@ class ImageSync:
             self._repair(repairs)
 
     def _note_force(self, force: HeldForce) -> None:
-        """Note a force of this process, or put back what is newer."""
+        """Record a force of this process, or restore a newer one."""
         key = force.view, force.element
         known = self._forces.get(key)
         if known is None or known[0] <= force.version:
@@ -346,7 +347,7 @@ class ImageSync:
             self._memory.release(force.view, force.element, PRESET_WRITER)
 
     def _repair(self, repairs: Iterable[Part | VersionedValue]) -> None:
-        """Put back what is newer than what was written here."""
+        """Restore values that are newer than what was written here."""
         memory = self._memory
         memory.now_ns = self._rack.now_ns
         for item in repairs:

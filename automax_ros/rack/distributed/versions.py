@@ -1,8 +1,8 @@
-"""From when each value of common memory counts, so that images of several processes come to hold the same.
+"""Versions of the values in common memory, by which the images of several processes come to agree.
 
-A value counts from (rack time, seat of the process that wrote it, number of its message): the greatest wins, wherever
-and in whatever order writes arrive (decision). The bits of a module's register count one by one, since a point may be
-one of them; a REAL or DOUBLE INTEGER point is two registers.
+A version is (rack time, seat of the process that wrote, number of its message); the greatest wins, wherever and in
+whatever order writes arrive (decision). Each bit of a module's register has its own version, since a point may be one
+bit; a REAL or DOUBLE INTEGER point is two registers.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from automax_ros.runtime.memory.registers import WORD, Part, RegisterMap
 Version = tuple[int, int, int]
 """Rack time (ns), seat, number of the message."""
 AS_INSTALLED: Version = (-1, 0, 0)
-"""What presets count from: every process writes them by itself, and whatever is written wins over them."""
+"""Version of presets: every process writes them, and any other write wins over them."""
 Key = tuple[int, int]
 """View and element."""
 
 
 class VersionedValue(NamedTuple):
-    """A value and from when it counts; of a register, the bits of ``mask``."""
+    """A value with its version; of a register, the bits of ``mask``."""
 
     view: int
     element: int
@@ -34,9 +34,9 @@ class VersionedValue(NamedTuple):
 
 @dataclass(frozen=True)
 class MergeResult:
-    """What an image makes of a write: ``whole`` to be taken as it is; else ``rest`` is what to write in its place.
+    """Result of comparing a write with an image: ``whole`` to apply it as it is, else ``rest`` to write instead.
 
-    ``rest`` are the registers (view of the bank, register, bits, mask) that are newer than what is held.
+    ``rest`` are the bits of registers (view of the bank, register, bits, mask) that are newer than those held.
     """
 
     whole: bool
@@ -48,16 +48,16 @@ REFUSED = MergeResult(whole=False)
 
 
 class Versions:
-    """From when the values of one image count. What was never written counts from nothing."""
+    """Versions of the values of one image. What was never written has none."""
 
     def __init__(self, registers: RegisterMap) -> None:
-        """Begin with an image as installed."""
+        """Create the versions of an image as installed."""
         self._registers = registers
         self._plain: dict[Key, tuple[Version, Value]] = {}
         self._bits: dict[Key, list[tuple[int, int, Version]]] = {}
 
     def settle(self, view: int, element: int, value: Value, version: Version) -> MergeResult:
-        """Compare a write with what is held, and note it as far as it is newer or as new."""
+        """Compare a write with what is held, and record what is newer or as new."""
         if view not in self._registers.views:
             held = self._plain.get((view, element))
             if held is not None and held[0] > version:
@@ -71,13 +71,13 @@ class Versions:
         return MergeResult(whole=False, rest=tuple(part for part in rest if part.mask))
 
     def settle_bits(self, held: VersionedValue) -> tuple[Part, ...]:
-        """Note what another image holds of a register, as far as it is newer; return what to write, if anything."""
+        """Record the bits of a register in another image that are newer; return what to write, if anything."""
         part = Part(held.view, held.element, int(held.value) & WORD, held.mask & WORD)
         mask = self._settle_bits(part, held.version)
         return (part._replace(mask=mask),) if mask else ()
 
     def newest(self, view: int, element: int, value: Value) -> Iterator[Part | VersionedValue]:
-        """Yield what is held where a write of this process came too late, to be put back."""
+        """Yield the values held that a late write of this process must not replace, to be restored."""
         if view not in self._registers.views:
             version, held = self._plain[view, element]
             yield VersionedValue(view, element, held, WORD, version)
@@ -88,7 +88,7 @@ class Versions:
                     yield Part(part.bank, part.register, bits, mask & part.mask)
 
     def all(self) -> Iterator[VersionedValue]:
-        """Yield everything that was written, for an image that another process takes over."""
+        """Yield all values that were written, for another process's image."""
         for (view, element), (version, value) in self._plain.items():
             yield VersionedValue(view, element, value, WORD, version)
         for (view, element), pieces in self._bits.items():
@@ -96,7 +96,7 @@ class Versions:
                 yield VersionedValue(view, element, bits, mask, version)
 
     def _settle_bits(self, part: Part, version: Version) -> int:
-        """Note the bits of a register that are newer; return which."""
+        """Record the bits of a register that are newer; return their mask."""
         key, mask = (part.bank, part.register), part.mask
         kept: list[tuple[int, int, Version]] = []
         for own, bits, since in self._bits.get(key, ()):
@@ -113,7 +113,7 @@ class Versions:
 
 
 def merged(before: int, parts: Sequence[Part]) -> int:
-    """Return a register's word, with its sign, after bits of it were replaced."""
+    """Return a register's word, with its sign, after some of its bits were replaced."""
     word = before & WORD
     for part in parts:
         word = word & ~part.mask | part.bits & part.mask

@@ -1,1 +1,1 @@
-"""The modules of a running rack; `building` joins them to their configurations."""
+"""The modules of a running rack; `building` makes them from their configurations."""

@@ -1,4 +1,4 @@
-"""The module of a running rack for each kind of configuration: the one table that joins the two."""
+"""Makes the module of a running rack for each kind of configuration: the one table of these pairs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from automax_ros.rackfile.modules.udc import UdcConfig
 
 
 def build_module(config: ModuleConfig, parts: RackServices) -> Module:
-    """Return the module of a running rack that a configuration describes."""
+    """Return the module of a running rack for a configuration."""
     return _BUILDERS[type(config)](config, parts)
 
 

@@ -1,29 +1,22 @@
-"""Modules that count how their interrupts keep their time. A file of its own: compiled code has no such protocols.
-
-The interrupts of a 57C406: when they come, and the scan that each of them makes due.
-
-The switches on the front of a 57C406 (52.1.6): a test switch A, centre, B, and a fault reset switch.
-
-Both are momentary: they go back when they are let go. A person holds the test switch where it was moved to until it is
-moved to the centre; the fault reset switch is pressed for half a second, or as long as ``false`` says (decision). They
-only tell: what they do is the application's business.
-
-The drive I/O controller 57C406 of a running rack: it interrupts, measures the drive, fires its gates (52.0, 52.7).
+"""A drive I/O controller 57C406 of a running rack: it interrupts, measures the drive and fires its gates (52.0, 52.7).
 
 It is the ``DrivePort`` of the current minor loop (CML) task that names its slot. While that task runs it interrupts six
-times per line cycle, measures its plant at that instant and makes a scan of the task due; what the scan commands it
-carries out: gates, the contactor's relay, the outputs of the drive digital I/O module. Without such a task gates and
-relays are off. The plant goes on in any case, whether the rack runs, is stopped or has no power (decision).
+times per line cycle, measures its plant at that instant and makes a scan of the task due; then it executes the command
+of the scan: gates, the contactor's relay, the outputs of the drive digital I/O module. Without such a task gates and
+relays are off. The plant continues in any case, whether the rack runs, is stopped or has no power (decision).
 
 Its registers are outputs: the task's initialisation gives them their defaults, STOP ALL and a loss of power 0 (2.4.5).
-The contactor follows what the task commands; a force on the point of a relay only changes what the point shows
-(decision).
+The contactor follows the task's command; a force on the point of a relay only changes what the point shows (decision).
 
-Each access to it delays the microprocessor on it (52.7). Its firing circuit goes on by itself meanwhile, so what is
-late is what the microprocessor has to do: to take the loop's command. In modeled execution a command takes effect later
-by ``ACCESS_NS`` for each common on its registers that a scan of any task has latched, read or written since the
-interrupt, at most until the next one; what comes after the command delays nothing. The loop's own dealings with it, and
-what comes from outside, count not, nor do accesses that a distributed rack makes in another process (decision).
+Each access to it delays its microprocessor (52.7). Its firing circuit works independently meanwhile, so only the
+microprocessor's work is late: accepting the loop's command. In modeled execution a command takes effect later by
+``ACCESS_NS`` for each common on its registers that a scan of any task has latched, read or written since the interrupt,
+at most until the next one; accesses after the command delay nothing. Accesses by the loop itself and from outside do
+not count, nor do those that a distributed rack makes in another process (decision).
+
+On its front are a test switch A, centre, B and a fault reset switch (52.1.6). Both are momentary. The test switch is
+held in its position until it is moved to the centre; the fault reset switch is pressed for half a second, or as long as
+``false`` says (decision). They are only inputs: their effect is up to the application.
 """
 
 from __future__ import annotations
@@ -55,14 +48,14 @@ from automax_ros.rackfile.modules.drive import ACCESS_NS, DEFAULTS, OPTIONS, PER
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
 
 USUAL_NS = 2_777_778
-"""Time between two interrupts until a task says otherwise, ns: a sixth of a cycle at 60 Hz (decision)."""
+"""Time between two interrupts until a task sets it, ns: a sixth of a cycle at 60 Hz (decision)."""
 LATE_NS = 1_000_000
-"""From how late on an interrupt counts as late, ns."""
+"""An interrupt later than this counts as late, ns."""
 
 
 @dataclass
 class InterruptTiming:
-    """How interrupts kept their time on the wall clock; in simulated time none is late.
+    """Lateness of interrupts on the wall clock; in simulated time none is late.
 
     Attributes:
         interrupts: how many there were.
@@ -80,7 +73,7 @@ class InterruptTiming:
         return f"{count_of(self.interrupts, 'interrupt')}, {late}, the latest by {self.greatest_ns / 1e6:.3g} ms"
 
     def note(self, late_ns: int) -> None:
-        """Count an interrupt that was as late as that; one that was not has 0 or less."""
+        """Count an interrupt with its lateness, 0 or less if it was not late."""
         self.interrupts += 1
         self.greatest_ns = max(self.greatest_ns, late_ns)
         if late_ns > LATE_NS:
@@ -88,15 +81,15 @@ class InterruptTiming:
 
 
 class DriveInterrupts:
-    """Interrupts from ``arm`` to ``disarm``. One that a late host missed is carried out late, in order (decision).
+    """Interrupts from ``arm`` to ``disarm``. One that a late host missed is executed late, in order (decision).
 
     Attributes:
         at_ns: when the last one was, ns.
-        interval_ns: the time from one to the next, ns, as the last command has it.
+        interval_ns: time from one to the next as the last command set it, ns.
     """
 
     def __init__(self, scheduler: Scheduler, slot: int, measure: Callable[[int], None]) -> None:
-        """Begin without; ``measure`` is called at each with its instant, before the scan that it makes due."""
+        """Create without interrupts; each calls ``measure`` with its instant, before the scan that it makes due."""
         self._scheduler, self._measure = scheduler, measure
         self._key = EventKey(EventClass.IO, slot, "interrupt")
         self._event: ScheduledEvent | None = None
@@ -111,17 +104,17 @@ class DriveInterrupts:
 
     @property
     def next_ns(self) -> int | None:
-        """When the next one comes, None while it is not armed."""
+        """When the next one comes; None while not armed."""
         return None if self._event is None else self._event_ns
 
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
-        """Interrupt at an instant, and from then on each interval; ``due`` has its place ``key`` among the scans."""
+        """Interrupt at ``first_ns`` and after each interval; ``due`` has the place ``key`` among the scans."""
         self.disarm()
         self._scan_key, self._due, self.armed = key, due, True
         self._post(first_ns, ScheduledEvent(self._key, self._happen))
 
     def disarm(self) -> None:
-        """Interrupt no more."""
+        """End the interrupts."""
         self.armed = False
         for event in (self._event, self._scan):
             if event is not None:
@@ -129,7 +122,7 @@ class DriveInterrupts:
         self._event = self._scan = None
 
     def follow(self, next_ns: int) -> None:
-        """Let the next one come as long after the last as a command says, ns; now where that has passed."""
+        """Set the time from the last interrupt to the next, ns, as commanded; if that has passed, interrupt now."""
         self.interval_ns = max(1, next_ns)
         if self._event is None:
             return
@@ -140,11 +133,11 @@ class DriveInterrupts:
             self._post(at_ns, ScheduledEvent(self._key, self._happen))
 
     def state(self) -> dict[str, int]:
-        """Return when the last one was, and the interval; who arms it keeps when the next one comes."""
+        """Return when the last one was, and the interval; the caller of ``arm`` keeps when the next one comes."""
         return {"at_ns": self.at_ns, "interval_ns": self.interval_ns}
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state."""
+        """Restore a state."""
         self.at_ns, self.interval_ns = state["at_ns"], state["interval_ns"]
 
     def _post(self, at_ns: int, event: ScheduledEvent) -> None:
@@ -169,16 +162,16 @@ class DriveInterrupts:
 
 
 def _nothing(now_ns: int, skipped: int) -> None:
-    """Make no scan due: nobody has armed the interrupts."""
+    """Make no scan due: the interrupts are not armed."""
 
 
 PRESSED_NS = 500_000_000
-"""How long the fault reset switch is pressed, ns (decision)."""
+"""Time for which the fault reset switch is pressed, ns (decision)."""
 TEST_SWITCH, FAULT_RESET_SWITCH = "test_switch", "fault_reset_switch"
 CONTROLS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {TEST_SWITCH: ("A", "B", "centre"), FAULT_RESET_SWITCH: ("true", "false")}
 )
-"""The switches with their positions, as stimuli files and commands write them."""
+"""The switches with their positions, as written in stimuli files and commands."""
 _TEST_BITS = {"A": SWITCH_A, "B": SWITCH_B, "centre": 0}
 
 
@@ -186,14 +179,14 @@ class FrontSwitches:
     """The switches of one module."""
 
     def __init__(self, scheduler: Scheduler, slot: int) -> None:
-        """Begin with nobody at them."""
+        """Create switches at rest."""
         self._scheduler = scheduler
         self._key = EventKey(EventClass.IO, slot, "switch")
         self._test = "centre"
         self._release: ScheduledEvent | None = None
 
     def status(self) -> int:
-        """Return the bits of ``Measured.status`` that they set."""
+        """Return the bits of ``Measured.status`` that the switches set."""
         return _TEST_BITS[self._test] | (RESET_SWITCH if self._release is not None else 0)
 
     def move(self, switch: str, position: str) -> None:
@@ -206,12 +199,12 @@ class FrontSwitches:
                 self._press(self._scheduler.now_ns + PRESSED_NS)
 
     def state(self) -> dict[str, object]:
-        """Return how they stand, and when the fault reset switch is let go, ns."""
+        """Return their positions, and when the fault reset switch is released, ns."""
         until_ns = None if self._release is None else self._scheduler.due_ns(self._release)
         return {"test": self._test, "pressed_until_ns": until_ns}
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state."""
+        """Restore a state."""
         self._let_go(0)
         self._test = state["test"]
         if state["pressed_until_ns"] is not None:
@@ -227,13 +220,13 @@ class FrontSwitches:
 
 
 _new = tuple.__new__
-"""Makes a named tuple as tuples are made: its own way takes twice the time, and there is one at each interrupt."""
+"""Makes a named tuple as a plain one: its own constructor takes twice the time, and one is made at each interrupt."""
 REST_NS = 5_500_000
-"""How often a plant whose drive rests is looked at, ns: the system clock tick (decision)."""
+"""Interval at which a plant whose drive rests is updated, ns: the system clock tick (decision)."""
 
 
 class DriveControllerModule:
-    """A 57C406 with the plant that it drives, if it has one."""
+    """A 57C406 with the plant that it drives, if any."""
 
     kept: frozenset[tuple[int, int]] = frozenset()
     tasks: Sequence[ScheduledTask] = ()
@@ -241,7 +234,7 @@ class DriveControllerModule:
     def __init__(
         self, config: ModuleConfig, parts: RackServices, plant: DrivePlant | None, full_rpm: float | None = None
     ) -> None:
-        """Attach itself to the rack's drives; nothing happens before a task arms it.
+        """Attach the module to the rack's drives; it does nothing until a task arms it.
 
         ``full_rpm`` is the speed that the plant's tachometer shows as 4095, None for the motor's base speed.
         """
@@ -265,27 +258,27 @@ class DriveControllerModule:
 
     @property
     def timing(self) -> InterruptTiming:
-        """How the interrupts kept their time."""
+        """Lateness of the interrupts."""
         return self._interrupts.timing
 
     # As a module
 
     def power_on(self) -> None:
-        """Let the plant's time pass; gates stay off until a task arms the module."""
+        """Start the plant's time; gates stay off until a task arms the module."""
         if not self._interrupts.armed:
             self._rest_from(self._scheduler.now_ns + REST_NS)
 
     def power_off(self) -> None:
-        """Forget the overspeed circuit; the task that has armed it was stopped, or has not begun."""
+        """Reset the overspeed circuit; the task that armed it is stopped, or has not started."""
         self.disarm()
         self._controller.overspeed.unpower()
 
     def stopped_all(self) -> None:
-        """Nothing more: the task that has armed it was stopped."""
+        """Disarm; the task that armed it is stopped."""
         self.disarm()
 
     def state(self) -> ModuleState:
-        """Return what was measured last, how the switches stand, and when it interrupts; the plant keeps its own."""
+        """Return the last measurement, the switches and when it interrupts; the plant has a state of its own."""
         rest_ns = None if self._rest is None else self._scheduler.due_ns(self._rest)
         return {
             "interrupts": self._interrupts.state(),
@@ -299,7 +292,7 @@ class DriveControllerModule:
         }
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state; the task that has armed it arms it again."""
+        """Restore a state; the task that armed the module arms it again."""
         self._interrupts.load(state["interrupts"])
         self._switches.load(state["switches"])
         self._measured = Measured(*state["measured"])
@@ -314,7 +307,7 @@ class DriveControllerModule:
             due_ns, (next_ns, relays, pulses, level, block, ok) = state["delayed"]
             self._delay(Command(next_ns, relays, tuple(Pulse(*pulse) for pulse in pulses), level, block, ok), due_ns)
 
-    # As something that a person operates
+    # As something that an operator handles
 
     @property
     def controls(self) -> Mapping[str, tuple[str, ...]]:
@@ -329,7 +322,7 @@ class DriveControllerModule:
 
     @property
     def next_ns(self) -> int | None:
-        """When the next interrupt comes, None while it is not armed."""
+        """When the next interrupt comes; None while not armed."""
         return self._interrupts.next_ns
 
     def initialise(self) -> None:
@@ -340,7 +333,7 @@ class DriveControllerModule:
             memory.write_now(self._view, value, self._writer, register, WriteKind.OUTSIDE)
 
     def watch_speed(self, counts: int) -> None:
-        """Set up the overspeed circuit: it stays so when the task ends."""
+        """Set the limit of the overspeed circuit, which stays set when the task ends."""
         self._controller.overspeed.counts = counts
 
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
@@ -349,7 +342,7 @@ class DriveControllerModule:
         self._interrupts.arm(first_ns, key, due)
 
     def disarm(self) -> None:
-        """Interrupt no more: gates, relays and drive OK are off at once."""
+        """End the interrupts: gates, relays and drive OK are off at once."""
         if not self._interrupts.armed:
             return
         self._interrupts.disarm()
@@ -359,7 +352,7 @@ class DriveControllerModule:
         self._rest_from(self._scheduler.now_ns + REST_NS)
 
     def measure(self, dig_slot: int) -> Measured:
-        """Return what was measured at the last interrupt, with registers, inputs and switches as they are now."""
+        """Return the measurement of the last interrupt, with registers, inputs and switches as they are now."""
         digital = self._digital
         digital.serve(dig_slot)
         memory, view, last = self._memory, self._view, self._measured
@@ -379,7 +372,7 @@ class DriveControllerModule:
         return _new(Measured, values)
 
     def command(self, command: Command) -> None:
-        """Carry out what shall happen up to the next interrupt; its times count from the last one."""
+        """Execute the command for the time up to the next interrupt; its times count from the last one."""
         at_ns, now_ns = self._interrupts.at_ns, self._scheduler.now_ns
         due_ns = min(now_ns + self._accesses * ACCESS_NS, at_ns + command.next_ns - 1)
         if due_ns > now_ns:
@@ -394,23 +387,23 @@ class DriveControllerModule:
         self._accesses += 1
 
     def _delay(self, command: Command, due_ns: int) -> None:
-        """Let a command take effect at an instant."""
+        """Delay a command until ``due_ns``."""
         self._delayed = command, self._scheduler.at(due_ns, self._command_key, self._carry_out)
 
     def _carry_out(self, now_ns: int) -> None:
-        """Carry out the command that was delayed."""
+        """Execute the delayed command."""
         delayed, self._delayed = self._delayed, None
         if delayed is not None:
             self._controller.command(delayed[0], self._interrupts.at_ns, now_ns)
 
     def _forget_accesses(self) -> None:
-        """Nothing is delayed any more."""
+        """Cancel the delayed command and count accesses from 0."""
         delayed, self._delayed, self._accesses = self._delayed, None, 0
         if delayed is not None:
             delayed[1].cancel()
 
     def _delayed_state(self) -> list[Any] | None:
-        """Return when a command takes effect that is delayed, and the command; None without one."""
+        """Return when a delayed command takes effect, and the command; None without one."""
         if self._delayed is None:
             return None
         command, event = self._delayed
@@ -422,7 +415,7 @@ class DriveControllerModule:
         feedback = self._parts.drives.voltage(self.config.slot)
         self._measured = self._controller.measure(now_ns, VOLTAGE if feedback is not None else 0)
         if self._controller.overspeed.tripped:
-            # A loop that hangs commands nothing: the hardware needs none.
+            # A loop that hangs sends no command, and the hardware needs none.
             self._digital.show(0, ok=False)
         if feedback is not None and self._plant is not None:
             line_v = self._plant.data.parameters.line_v
@@ -439,7 +432,7 @@ class DriveControllerModule:
             self._rest = None
 
     def _look(self, now_ns: int) -> None:
-        """Let the plant's time pass while nobody drives it; no look is left out where the host is late."""
+        """Advance the plant while it is not driven; no update is left out if the host is late."""
         self._rest_from(now_ns + REST_NS)
         plant = self._plant
         if plant is not None:

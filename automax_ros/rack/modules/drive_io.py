@@ -1,6 +1,6 @@
-"""The points of a drive digital I/O module that belong to the drive: DIG_IO_SLOT of the CML task names the module.
+"""The modules next to a 57C406: the drive digital I/O module, which DIG_IO_SLOT of the CML task names, and the 57C405.
 
-A 57C405 of a running rack: it shows the armature voltage that is wired to it (52.6.1).
+The 57C405 shows the armature voltage that is wired to it (52.6.1).
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from automax_ros.runtime.memory.registers import Backplane
 from automax_ros.runtime.time.scheduler import Scheduler
 
 GAINS = {230: 0.02, 380: 0.0121, 460: 0.01, 550: 0.00835, 660: 0.00696}
-"""Volts at the 57C405 a volt of the armature, by the nominal line voltage of the transformer, V rms (52.6.1)."""
+"""Volts at the 57C405 per volt of the armature, by the nominal line voltage of the transformer, V rms (52.6.1)."""
 FULL_SCALE_V, FULL_SCALE_COUNTS = 10.0, 4095
-"""What the input shows at its full scale (decision: as a 57C409)."""
+"""Full scale of the input, V and counts (decision: as a 57C409)."""
 
 
 @cache
 def voltage_gain(line_v: float) -> float:
-    """Return the gain of the transformer for a line of a nominal voltage (V rms, line to line)."""
+    """Return the gain of the transformer for a line's nominal voltage (V rms, line to line)."""
     return GAINS[min(GAINS, key=lambda nominal: abs(nominal - line_v))]
 
 
 def voltage_counts(volts: float, line_v: float) -> int:
-    """Return what register 0 shows for an armature voltage, V."""
+    """Return the count of register 0 for an armature voltage, V."""
     counts = round_count(volts * voltage_gain(line_v) / FULL_SCALE_V * FULL_SCALE_COUNTS)
     return max(-FULL_SCALE_COUNTS, min(FULL_SCALE_COUNTS, counts))
 
@@ -45,7 +45,7 @@ class DriveAnalogModule(IoModule):
     """A 57C405."""
 
     def feel(self, volts: float, line_v: float) -> None:
-        """Show an armature voltage, V, through the transformer for a line of a nominal voltage, V."""
+        """Show an armature voltage, V, through the transformer for a line's nominal voltage, V."""
         self._show(0, voltage_counts(volts, line_v))
 
 
@@ -53,27 +53,27 @@ _OWN = 3 << FMCR_BIT | 1 << DRIVE_OK_BIT
 
 
 class DriveDigital:
-    """Reads the drive's inputs and sets its outputs. A slot without such registers reads 0 and takes nothing.
+    """Reads the drive's inputs and sets its outputs. A slot without such registers reads 0 and ignores outputs.
 
     Attributes:
-        slot: where the module is, None as long as no task has said so.
+        slot: where the module is, None until a task names it.
     """
 
     def __init__(self, memory: CommonMemory, backplane: Backplane, scheduler: Scheduler, writer: int) -> None:
-        """Begin without a module; ``writer`` is the id under which outputs are written."""
+        """Create without a module; ``writer`` is the id under which outputs are written."""
         self._memory, self._backplane, self._scheduler, self._writer = memory, backplane, scheduler, writer
         self.slot: int | None = None
         self._view: int | None = None
 
     def serve(self, slot: int | None) -> None:
-        """Take the module in a slot, None for none."""
+        """Use the module in a slot, None for none."""
         if slot != self.slot:
             bank = None if slot is None else self._backplane.bank(slot)
             self.slot = slot
             self._view = bank.view if bank is not None and bank.registers > DRIVE_OUTPUTS else None
 
     def status(self) -> int:
-        """Return the bits of ``Measured.status`` that the inputs set, forced ones as they are forced."""
+        """Return the bits of ``Measured.status`` that the inputs set, forced ones at their forced values."""
         if self._view is None:
             return 0
         word = int(self._memory.read_now(self._view, DRIVE_INPUTS))
@@ -81,7 +81,7 @@ class DriveDigital:
         return permissive | (EXTERNAL_TRIP if word >> EXTERNAL_TRIP_BIT & 1 else 0)
 
     def show(self, relays: int, *, ok: bool) -> None:
-        """Set the contactor relays (FMCR, RMCR) and drive OK; the module's other outputs stay."""
+        """Set the contactor relays (FMCR, RMCR) and drive OK; the module's other outputs are unchanged."""
         view = self._view
         if view is None:
             return

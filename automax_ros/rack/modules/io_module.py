@@ -1,9 +1,9 @@
-"""An I/O module of a running rack: its registers, and the interrupts that it raises while there is a common clock.
+"""An I/O module of a running rack: its registers, and its interrupts while the common clock runs.
 
-An interrupt comes at whole periods after the clock was turned on, a period being (period register + 1) x 0.5 ms. It
-needs the clock, an installed task with an EVENT on its ISCR and, where it has one, its enable bit: it begins when the
-last of the three is there, and a new period counts from the same beginning (decision). Interrupts of one instant come
-in the order of slots, before all scans. A module without a clock does not interrupt.
+Interrupts come at whole periods after the clock was turned on, a period being (period register + 1) x 0.5 ms. They need
+the clock, an installed task with an EVENT on its ISCR and the enable bit, if the module has one: they start when the
+last of the three is there, and a new period counts from the same start of the clock (decision). Interrupts of one
+instant come in the order of slots, before all scans. A module without a clock does not interrupt.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class IoModule:
     tasks: Sequence[ScheduledTask] = ()
 
     def __init__(self, config: ModuleConfig, parts: RackServices) -> None:
-        """Take a module's configuration; nothing happens before the clock is turned on."""
+        """Create a module from its configuration; it does nothing until the clock is turned on."""
         bank = parts.backplane.bank(config.slot)
         assert bank is not None
         self.config, self._parts, self._view = config, parts, bank.view
@@ -44,14 +44,14 @@ class IoModule:
             parts.inputs.shape(self._doubles(first), _counted)
 
     def power_on(self) -> None:
-        """Nothing begins: no register drives the clock yet."""
+        """Start nothing: no register drives the clock yet."""
 
     def power_off(self) -> None:
         """End its interrupts."""
         self.stopped_all()
 
     def stopped_all(self) -> None:
-        """Let the inputs follow the process again: nobody waits for them."""
+        """Unfreeze the inputs: no task waits for them."""
         for interrupt in self._interrupts:
             interrupt.free()
 
@@ -60,7 +60,7 @@ class IoModule:
         return {str(item.status): item.state() for item in self._interrupts}
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state.
+        """Restore a state.
 
         Raises:
             ValueError: the state is that of another module.
@@ -84,7 +84,7 @@ class IoModule:
         parts.interrupts.watch(self._task_installed)
 
     def _doubles(self, first: int) -> list[tuple[int, int]]:
-        """Return the DOUBLE INTEGERs that stand at a register."""
+        """Return the DOUBLE INTEGERs at a register."""
         memory = self._parts.memory
         shown = memory.registers.showing(self._view, [first])
         return [key for key in sorted(shown) if memory.specs[key[0]].type is DataType.DOUBLE]
@@ -94,14 +94,14 @@ class IoModule:
             self._look_soon()
 
     def _look_soon(self) -> None:
-        """Look at the registers once the write that has changed one is complete, still at this instant."""
+        """Check the registers when the write that changed one is complete, still at this instant."""
         if not self._looks:
             self._looks = True
             scheduler, key = self._parts.scheduler, EventKey(EventClass.IO, self.config.slot, "")
             scheduler.at(scheduler.now_ns, key, lambda _: self._look())
 
     def _look(self) -> None:
-        """Follow the clock and the registers."""
+        """Start or end interrupts as the clock and the registers require."""
         self._looks = False
         for interrupt in self._interrupts:
             interrupt.look()
@@ -133,7 +133,7 @@ class _PeriodicInterrupt:
         self._event: ScheduledEvent | None = None
 
     def look(self) -> None:
-        """Let the next interrupt be where clock and registers have it."""
+        """Schedule the next interrupt by the clock and the registers."""
         since, period = self._parts.clock.since_ns, self._period_ns
         if since is None or not self._is_enabled:
             self._cancel()
@@ -142,7 +142,7 @@ class _PeriodicInterrupt:
             self._begin(since + (passed + 1) * period)
 
     def free(self) -> None:
-        """Let its inputs follow the process."""
+        """Unfreeze its inputs."""
         if self._parts.inputs.free(self._freezer):
             self._parts.tell_writes()
 
@@ -152,7 +152,7 @@ class _PeriodicInterrupt:
         return {"next_ns": due, **self._freezer.state()}
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state, with the registers of that time."""
+        """Restore a state, with the registers of that time."""
         self._cancel()
         if state["next_ns"] is not None:
             self._begin(state["next_ns"])

@@ -1,4 +1,4 @@
-"""A module of a running rack, and what the rack gives to it. The rack, the stream and the nodes know no more of one."""
+"""A module of a running rack and the rack's services: all that the rack, the stream and the nodes know of modules."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from automax_ros.runtime.tasks.task import Task
 from automax_ros.runtime.time.scheduler import Scheduler
 
 ModuleState = Mapping[str, Any]
-"""What a module keeps next to common memory, as numbers, texts, lists and mappings: ``{}`` where that is nothing."""
+"""State of a module apart from common memory, as numbers, texts, lists and mappings: ``{}`` if it has none."""
 
 
 class Install(Protocol):
-    """Makes a task of a module's configuration."""
+    """Installs a task of a module's configuration."""
 
     def __call__(
         self,
@@ -39,23 +39,23 @@ class Install(Protocol):
         trigger: MakeTrigger | None = None,
         then: Callable[[Task], None] | None = None,
     ) -> ScheduledTask:
-        """Return the task, installed; it works on the rack's ``memory`` unless it has another.
+        """Return the task, installed; it works on the rack's ``memory`` unless another is given.
 
-        Without ``trigger`` its scans begin by the clock, or by the event that SCAN_LOOP names. ``then`` is called after
-        each scan, and after its start-up part, when observers were told.
+        Without ``trigger`` its scans start by the clock, or by the event that SCAN_LOOP names. ``then`` is called after
+        each scan, and after its start-up part, when observers were notified.
         """
         ...
 
 
 @dataclass(frozen=True)
 class RackServices:
-    """What a rack gives to its modules.
+    """Services of a rack for its modules.
 
-    ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them. ``tell_writes`` tells
-    observers of writes that no scan has made. ``writer`` returns the id under which a module writes registers.
-    A 57C406 attaches itself to ``drives``.
-    ``plants`` are those with a motor, by name; the rack keeps their states. ``full_speeds`` has the speed (rpm) that a
-    plant's tachometer shows as 4095, by name, where a feed brings it in counts.
+    ``install`` makes their tasks; ``execution`` returns, for a module's name, the execution of its scans.
+    ``tell_writes`` reports to observers the writes that were not made by a scan. ``writer`` returns the id under which
+    a module writes registers. A 57C406 attaches itself to ``drives``. ``plants`` are those with a motor, by name; the
+    rack keeps their states. ``full_speeds`` has the speed (rpm) that a plant's tachometer shows as 4095, by name, if a
+    feed brings it in counts.
     """
 
     memory: CommonMemory
@@ -75,7 +75,7 @@ class RackServices:
 
 
 class Module(Protocol):
-    """A module of a running rack. ``tasks`` stand in the order in which they start: priority, then name."""
+    """A module of a running rack. ``tasks`` are in the order in which they start: priority, then name."""
 
     @property
     def config(self) -> ModuleConfig: ...  # noqa: D102
@@ -85,27 +85,27 @@ class Module(Protocol):
 
     @property
     def kept(self) -> frozenset[tuple[int, int]]:
-        """The views and elements that it keeps when STOP ALL or a restart clears memory, such as its inputs."""
+        """Views and elements that it keeps when STOP ALL or a restart clears memory, such as its inputs."""
         ...
 
     def power_on(self) -> None:
-        """Begin what it does by itself, at the scheduler's present."""
+        """Start its activity now, at the scheduler's time."""
         ...
 
     def power_off(self) -> None:
-        """End all that it does by itself."""
+        """End all its activity."""
         ...
 
     def stopped_all(self) -> None:
-        """Follow a STOP ALL: its tasks are stopped, and common memory is cleared but for what it ``kept``."""
+        """React to a STOP ALL: its tasks are stopped, and common memory is cleared except what it ``kept``."""
         ...
 
     def state(self) -> ModuleState:
-        """Return what it keeps apart from common memory."""
+        """Return its state apart from common memory."""
         ...
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state, in place of ``power_on``.
+        """Restore a state, in place of ``power_on``.
 
         Raises:
             ValueError: the state does not fit.
@@ -115,7 +115,7 @@ class Module(Protocol):
 
 @runtime_checkable
 class Operable(Protocol):
-    """A module with controls that a person moves.
+    """A module with controls for an operator.
 
     ``controls`` are their names, such as ``test_switch``, with their positions, such as ``A``, ``B`` and ``centre``.
     """
@@ -134,24 +134,24 @@ class Operable(Protocol):
 
 @dataclass
 class QuietModule:
-    """A module that does nothing by itself: its registers, if it has some, are all there is."""
+    """A module without activity: it has only its registers, if any."""
 
     config: ModuleConfig
     kept: frozenset[tuple[int, int]] = frozenset()
     tasks: Sequence[ScheduledTask] = field(default=())
 
     def power_on(self) -> None:
-        """Nothing begins."""
+        """Start nothing."""
 
     def power_off(self) -> None:
-        """Nothing ends."""
+        """End nothing."""
 
     def stopped_all(self) -> None:
-        """Nothing follows."""
+        """Do nothing."""
 
     def state(self) -> ModuleState:
-        """Return nothing: its registers are in common memory."""
+        """Return an empty state: its registers are in common memory."""
         return {}
 
     def load(self, state: ModuleState) -> None:
-        """Take over nothing."""
+        """Restore nothing."""

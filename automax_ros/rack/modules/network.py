@@ -1,21 +1,20 @@
-"""A network module 57C404 of a running rack: its registers, and what it exchanges with the other racks of a network.
+"""A network module 57C404 of a running rack: its registers, and its exchange with the other racks of a network.
 
-Once in a cycle of 5.5 ms of rack time it sends, as long as it has power: the master the broadcast registers and its
-half of each drop on which a variable of its rack file stands or to which a task has written since the power came
-(decision: a drop of its own is not sent because a stranger claims to be there); a slave, while it hears the master, its
-half of the drops that it represents. What arrives is written into registers by the module, between two scans, at the
-instant at which it arrives, and recorded like any other write: a replay needs no network. The length of the cycle is
-ours, after the tick of a Processor (decision): no source at hand prints one. A host that is late skips cycles, which do
-not count as time-outs (decision).
+With power, it sends once per cycle of 5.5 ms of rack time. The master sends the broadcast registers and its half of
+each drop that has a variable in its rack file or to which a task has written since power-up (decision: a drop of its
+own is not sent because a stranger claims to be there). A slave sends, while it receives from the master, its half of
+the drops that it represents. The module writes received words into registers, between two scans, at the instant of
+their arrival, and they are recorded like any other write: a replay needs no network. The length of the cycle is ours,
+after the tick of a Processor (decision): no source at hand prints one. A host that is late skips cycles, which do not
+count as time-outs (decision).
 
-A lost drop keeps the values that came last; its status bits are cleared and the module shows the code C until it is
-heard again; that no task stops for it is ours (decision). STOP ALL clears outputs, so that the others see 0; the depth
-of a slave stays as it was defined (decision). Without power the module is silent and forgets all.
+A lost drop keeps its last values; its status bits are cleared and the module shows the code C until the drop is
+received again; that no task stops for it is ours (decision). STOP ALL clears outputs, so that the others see 0; the
+depth of a slave stays as it was defined (decision). Without power the module sends nothing and loses its memory.
 
-The drop depth is 1 when the power comes; register 20 shows 0 then, so that a task's 1 can be seen (decision). The
-module processes what a task writes there at its next cycle. Before that a drop communicates, its status bits being 0.
-
-Counters show what they have counted at every sixteenth cycle (decision: each showing is an entry of the write log).
+The drop depth is 1 after power-up; register 20 shows 0 then, so that a task's 1 can be recognized (decision). The
+module processes a task's write to it at its next cycle. Until then a drop does not communicate: its status bits are 0.
+Counters are shown at every sixteenth cycle (decision: each showing is an entry of the write log).
 """
 
 from __future__ import annotations
@@ -54,7 +53,7 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEv
 CYCLE_NS = 5_500_000
 """Time between two frames of a drop, ns."""
 SHOW_EVERY = 16
-"""Cycles between two showings of the counters."""
+"""Cycles after which the counters are shown again."""
 LOST_CODE = "C"
 """The hardware's code for four receive time-outs in a row (57C570 manual p. 18-6)."""
 _COUNTERS = {
@@ -73,7 +72,7 @@ class NetworkModule:
     tasks: Sequence[ScheduledTask] = ()
 
     def __init__(self, config: ModuleConfig, network: str, drop: int, parts: RackServices) -> None:
-        """Take a module's configuration; nothing happens before the power comes."""
+        """Create a module from its configuration; it does nothing until power-up."""
         bank = parts.backplane.bank(config.slot)
         assert bank is not None
         self.config, self.network = config, network
@@ -95,11 +94,11 @@ class NetworkModule:
     # Station
 
     def connect(self, send: Send) -> None:
-        """Let what it sends be carried from now on."""
+        """Set the function that transmits its frames from now on."""
         self._send = send
 
     def receive(self, frames: Iterable[tuple[Sender, DropMessage]], damaged: int = 0) -> None:
-        """Take frames of others, between two scans, and count those that arrived but could not be read."""
+        """Process received frames, between two scans, and count those that could not be read."""
         if self._event is None:
             return
         self._count["unreadable"] += damaged
@@ -112,7 +111,7 @@ class NetworkModule:
         self._parts.tell_writes()
 
     def status(self) -> NetworkStatus:
-        """Return how it stands."""
+        """Return its status on the network."""
         hearing = self._hearing
         powered = self._event is not None
         return NetworkStatus(
@@ -129,14 +128,14 @@ class NetworkModule:
     # Module
 
     def power_on(self) -> None:
-        """Show its drop, and begin."""
+        """Show its drop, and start its cycles."""
         self._forget()
         self._parts.memory.now_ns = self._parts.scheduler.now_ns
         self._write(OWN_DROP, self._drop | VALID)
         self._begin(self._parts.scheduler.now_ns + CYCLE_NS)
 
     def power_off(self) -> None:
-        """Fall silent; its memory is lost."""
+        """Stop sending; its memory is lost."""
         if self._event is not None:
             self._event.cancel()
             self._event = None
@@ -145,10 +144,10 @@ class NetworkModule:
             self._write(number, 0)
 
     def stopped_all(self) -> None:
-        """Go on: its outputs are 0 now, and the others see that."""
+        """Continue: its outputs are 0 now, and the others see that."""
 
     def state(self) -> ModuleState:
-        """Return when the next cycle comes (ns), what it counted, and whom it hears."""
+        """Return when the next cycle comes (ns), its counters, and from which senders it receives."""
         return {
             "next_ns": self._parts.scheduler.due_ns(self._event) if self._event is not None else None,
             "depth": self._depth,
@@ -161,7 +160,7 @@ class NetworkModule:
         }
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state, with the registers of that time.
+        """Restore a state, with the registers of that time.
 
         Raises:
             ValueError: the state is that of another module.
@@ -184,13 +183,13 @@ class NetworkModule:
         return range(self._drop, self._drop + self._depth)
 
     def _named_drops(self) -> list[int]:
-        """Return the drops on whose areas variables of the rack file stand."""
+        """Return the drops in whose areas the rack file has variables."""
         places = (spec.place for spec in self._parts.memory.specs)
         drops = {place.register // AREA for place in places if place is not None and place.bank == self._view}
         return sorted(drops - {MASTER})
 
     def _watch_writes(self) -> None:
-        """Note to which drops a task writes that no variable stands on."""
+        """Record to which drops without variables a task writes."""
         for drop in range(1, LAST_DROP + 1):
             for number in from_master(drop) if drop not in self._named else ():
                 self._parts.memory.watch(self._view, number, partial(self._written.add, drop))
@@ -220,7 +219,7 @@ class NetworkModule:
         self._parts.tell_writes()
 
     def _process_depth(self) -> None:
-        """Follow what a task has written into the depth register since it was processed."""
+        """Process a depth that a task wrote into the register since the last cycle."""
         word = self._read(DEPTH)
         if word == 0 or word & DONE:
             return
@@ -232,7 +231,7 @@ class NetworkModule:
             self._write(DEPTH, value | DONE | INVALID)
 
     def _show_drops(self) -> None:
-        """Show which drops communicate, as far as that has changed: stimuli may have written something else."""
+        """Show which drops communicate, where that changed: stimuli may have written something else."""
         for index, bits in enumerate(self._communicating()):
             if self._bits[index] != bits:
                 self._bits[index] = bits
@@ -268,7 +267,7 @@ class NetworkModule:
         return DropMessage(self._drop, self._depth, self._defined, drop, self._sequence % (1 << 32), words)
 
     def _take(self, sender: Sender, frame: DropMessage) -> None:
-        """Take a sound frame: that of the other side, or of a rival that uses drops of this module."""
+        """Process a valid frame: from the other side, or from a rival that uses drops of this module."""
         from_the_master = frame.station == MASTER
         if self._is_master == from_the_master:
             if from_the_master or not set(self._own).isdisjoint(frame.drops):
@@ -284,7 +283,7 @@ class NetworkModule:
             self._accept(frame, from_slave(frame.drop), self._hearing.take(sender, frame))
 
     def _follows_master(self, sender: Sender) -> int | None:
-        """Return 0 where the master that is heard has sent it: only its broadcast frame shows missed cycles."""
+        """Return 0 if the present master sent it: only its broadcast frame shows missed cycles."""
         return 0 if self._hearing.drops[MASTER].is_heard and self._hearing.drops[MASTER].sender == sender else None
 
     def _accept(self, frame: DropMessage, registers: range, missed: int | None) -> None:
@@ -299,7 +298,7 @@ class NetworkModule:
         return int(self._parts.memory.read_now(self._view, number)) & _WORD
 
     def _write(self, number: int, word: int) -> None:
-        """Write a register that has another value."""
+        """Write a register if its value changes."""
         if self._read(number) != word & _WORD:
             value, writer = sign_extended(word & _WORD, 16), self._parts.writer(self.config.name)
             self._parts.memory.write_now(self._view, value, writer, number, WriteKind.OUTSIDE)

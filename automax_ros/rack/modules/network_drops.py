@@ -1,12 +1,12 @@
-"""Whom a network module hears: who sends each drop, since when it is silent, and who sends what is another's.
+"""The frames of a network, and the drops that a module receives: their senders, their silence, their rivals.
 
-A cycle without a frame of a drop makes it silent; ``TIMEOUT_CYCLES`` of them are a receive time-out, and ``MISSES`` of
-those in a row lose the drop (57C570 manual p. 18-6), after 88 ms. The length of a time-out is ours (decision): no
-source at hand prints it, and the loss of a station is told within 100 ms, as that of a process of a distributed rack.
+A cycle without a frame of a drop counts as silence; ``TIMEOUT_CYCLES`` of them are a receive time-out, and ``MISSES``
+time-outs in a row lose the drop (57C570 manual p. 18-6), after 88 ms. The length of a time-out is ours (decision): no
+source at hand prints it, and the loss of a station is reported within 100 ms, as that of a process of a distributed
+rack.
 
-What the stations of a network send each other: the module makes and takes frames, whoever carries them is told how.
-
-Nothing here knows of ROS 2: ``ros/nodes/network.py`` is such a carrier, tests are others.
+Modules make and process frames; a carrier transmits them. Nothing here depends on ROS 2: ``ros/nodes/network.py`` is
+such a carrier, tests are others.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from automax_ros.rackfile.modules.network import HALF, LAST_DROP, MASTER, greate
 class DropMessage:
     """The registers that one station sends of one drop, once per cycle.
 
-    ``station`` is the drop of the sender, ``depth`` how many drops it represents and ``defined`` whether a task has
-    said so. ``drop`` is whose registers these are: one of its own where the sender is a slave; 0 in the master's frame
-    of the broadcast registers. ``words`` are 32 numbers of 16 bits with sign: the half of the area that it writes.
-    ``sequence`` counts the sender's cycles and goes on at 0 after 2^32.
+    ``station`` is the drop of the sender, ``depth`` how many drops it represents and ``defined`` whether a task has set
+    the depth. ``drop`` is the drop of these registers: one of the sender's own if it is a slave; 0 in the master's
+    frame of the broadcast registers. ``words`` are 32 signed numbers of 16 bits: the half of the area that the sender
+    writes. ``sequence`` counts the sender's cycles modulo 2^32.
     """
 
     station: int
@@ -54,27 +54,27 @@ class DropMessage:
 
 @dataclass(frozen=True, order=True)
 class Sender:
-    """Who has sent a frame: the run of a rack, the slot of the module, and the rack's name for messages."""
+    """Sender of a frame: the run of a rack, the slot of the module, and the rack's name for messages."""
 
     run_id: int
     slot: int
     rack: str
 
     def __str__(self) -> str:
-        """Return it as messages name it."""
+        """Return the name used in messages."""
         return f"rack {self.rack or '?'} slot {self.slot}"
 
 
 Send = Callable[[int, Sequence[DropMessage]], None]
-"""Carries what a module sends: rack time (ns), the frames of a cycle."""
+"""Transmits a module's frames: rack time (ns), the frames of a cycle."""
 
 
 @dataclass(frozen=True)
 class NetworkStatus:
-    """How a module stands on its network.
+    """Status of a module on its network.
 
-    ``heard`` are the drops that it hears, ``lost`` those that it waits for, ``rivals`` the senders that use its own
-    drops or another's. ``code`` is C where a drop is lost (57C570 manual p. 18-6), else "".
+    ``heard`` are the drops that it receives, ``lost`` those that it waits for, ``rivals`` the senders that use its own
+    drops or another's. ``code`` is C if a drop is lost (57C570 manual p. 18-6), else "".
     """
 
     drop: int
@@ -97,27 +97,27 @@ class Station(Protocol):
         ...
 
     def connect(self, send: Send) -> None:
-        """Let what it sends be carried from now on."""
+        """Set the function that transmits its frames from now on."""
         ...
 
     def receive(self, frames: Iterable[tuple[Sender, DropMessage]], damaged: int = 0) -> None:
-        """Take frames of others, between two scans, and count those that arrived but could not be read."""
+        """Process received frames, between two scans, and count those that could not be read."""
         ...
 
     def status(self) -> NetworkStatus:
-        """Return how it stands."""
+        """Return its status on the network."""
         ...
 
 
 TIMEOUT_CYCLES, MISSES = 4, 4
 MOST_RIVALS = 8
-"""Senders that are told apart as rivals at one time (decision): a stranger can call itself anything."""
+"""Most senders that are listed as rivals at one time (decision): a stranger can call itself anything."""
 _WRAP = 1 << 32
 
 
 @dataclass
 class Drop:
-    """A drop that is awaited: who sends it, None as long as nobody has, and how long it has been silent (cycles)."""
+    """A drop that is awaited: its sender, None before its first frame, and its silence (cycles)."""
 
     sender: Sender | None = None
     sequence: int = 0
@@ -131,44 +131,44 @@ class Drop:
 
     @property
     def is_heard(self) -> bool:
-        """Whether somebody sends it."""
+        """Whether its frames arrive."""
         return self.sender is not None and not self.is_lost
 
 
 class Hearing:
-    """The drops that a module waits for; ``rivals`` are senders of what is another's, with their silence (cycles)."""
+    """The drops that a module waits for; ``rivals`` are senders that use another's, with their silence (cycles)."""
 
     def __init__(self, awaited: Iterable[int] = ()) -> None:
-        """Wait for drops from the beginning."""
+        """Create with drops that are awaited from the start."""
         self._awaited = tuple(awaited)
         self.drops: dict[int, Drop] = {}
         self.rivals: dict[Sender, int] = {}
         self.clear()
 
     def clear(self) -> None:
-        """Hear nobody: the power was switched on."""
+        """Forget all senders: the power was switched on."""
         self.drops = {drop: Drop() for drop in self._awaited}
         self.rivals = {}
 
     def take(self, sender: Sender, frame: DropMessage) -> int | None:
-        """Take in whose frame it is; return how many frames of the drop were missed, None where it is a rival's."""
+        """Record the sender of a frame; return how many frames of the drop were missed, None for a rival's."""
         known = self.drops.setdefault(frame.drop, Drop())
         if known.is_heard and known.sender != sender:
             self.meet(sender)
             return None
         missed = (frame.sequence - known.sequence - 1) % _WRAP if known.is_heard else 0
-        if missed >= _WRAP // 2:  # an older one, that another has overtaken
+        if missed >= _WRAP // 2:  # an older one, overtaken by another
             return None
         known.sender, known.sequence, known.defined, known.silent = sender, frame.sequence, frame.defined, 0
         return missed
 
     def meet(self, rival: Sender) -> None:
-        """Remember who sends what is another's."""
+        """Record a sender that uses another's drop."""
         if rival in self.rivals or len(self.rivals) < MOST_RIVALS:
             self.rivals[rival] = 0
 
     def cycle(self) -> int:
-        """Let a cycle pass; return how many receive time-outs there were."""
+        """Count a cycle of silence; return how many receive time-outs it completed."""
         timeouts = 0
         for drop in self.drops.values():
             if not drop.is_lost:
@@ -180,16 +180,16 @@ class Hearing:
 
     @property
     def heard(self) -> tuple[int, ...]:
-        """The drops that somebody sends."""
+        """The drops whose frames arrive."""
         return tuple(sorted(drop for drop, item in self.drops.items() if item.is_heard))
 
     @property
     def lost(self) -> tuple[int, ...]:
-        """The drops that are awaited in vain."""
+        """The drops that are lost."""
         return tuple(sorted(drop for drop, item in self.drops.items() if item.is_lost))
 
     def state(self) -> dict[str, object]:
-        """Return all of it."""
+        """Return all of its state."""
         drops = [
             [number, None if item.sender is None else list(astuple(item.sender)), *astuple(item)[1:]]
             for number, item in sorted(self.drops.items())
@@ -197,10 +197,10 @@ class Hearing:
         return {"drops": drops, "rivals": [[*astuple(item), silent] for item, silent in sorted(self.rivals.items())]}
 
     def load(self, drops: Iterable[Sequence[Any]], rivals: Iterable[Sequence[Any]]) -> None:
-        """Take over a state.
+        """Restore a state.
 
         Raises:
-            TypeError: it is none.
+            TypeError: it is not a state.
         """
         self.drops = {
             number: Drop(None if sender is None else Sender(*sender), *rest) for number, sender, *rest in drops

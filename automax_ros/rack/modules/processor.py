@@ -19,7 +19,7 @@ class ProcessorModule:
     kept: frozenset[tuple[int, int]] = frozenset()
 
     def power_on(self) -> None:
-        """Nothing begins: tasks are put into RUN by the rack, in the order of all its Processors."""
+        """Start nothing: the rack puts tasks into RUN, in the order of all its Processors."""
 
     def power_off(self) -> None:
         """Stop the tasks; locals, tunables and error logs stay (2.4.5)."""
@@ -27,14 +27,14 @@ class ProcessorModule:
             task.stop()
 
     def stopped_all(self) -> None:
-        """Nothing follows: locals, tunables and error logs stay (2.4.5)."""
+        """Do nothing: locals, tunables and error logs stay (2.4.5)."""
 
     def state(self) -> ModuleState:
         """Return the state of each task."""
         return {item.task.name: item.state() for item in self.tasks}
 
     def load(self, state: ModuleState) -> None:
-        """Take over the state of each task; those that ran go on with their next scan."""
+        """Restore the state of each task; those that ran continue with their next scan."""
         if set(state) != {item.task.name for item in self.tasks}:
             raise ValueError(f"{self.config.name} has the tasks {[item.task.name for item in self.tasks]}")
         for item in self.tasks:

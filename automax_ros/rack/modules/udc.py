@@ -1,14 +1,13 @@
 """A UDC module of a running rack: its scans on the common clock, its copies of registers, its interrupt.
 
 A scan of the module is A's task, then B's, every TICKS x 0.5 ms, from the end of the first interval of the common clock
-on (S-3056 p. 4-4, 4-8). It copies application registers in, lets A run and copies out what A writes, then B. What A has
-written B finds in the same scan (S-3006 p. 4-2). A task that is put into RUN while the other scans joins at the next
-scan of the module (decision). Scans of UDCs come before those of Processors at the same instant (decision).
+on (S-3056 p. 4-4, 4-8). It copies application registers in, executes A and copies out what A wrote, then likewise B.
+What A wrote B reads in the same scan (S-3006 p. 4-2). A task that is put into RUN while the other scans joins at the
+next scan of the module (decision). Scans of UDCs come before those of Processors at the same instant (decision).
 
-Which application registers a UDC copies between its local memory and the dual port, and for which task.
-
-What a task of the UDC writes is an output, all else an input (S-3056 p. 3-50). Booleans go out 32 bits at a time: with
-one of them both registers of an even pair are outputs, whatever else stands there, so that neighbours are overwritten.
+Application registers are copied between the local memory and the dual port. A register that a task of the UDC writes is
+an output, all others are inputs (S-3056 p. 3-50). Booleans are copied out 32 bits at a time: one of them makes both
+registers of an even pair outputs, whatever else they hold, so that neighbours are overwritten.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ Key = tuple[int, int]
 
 @dataclass(frozen=True)
 class Copied:
-    """What is copied at one of the two rates: ``inputs`` in, and out what each task has written, by its name."""
+    """Copies at one of the two rates: ``inputs`` are copied in, ``outputs`` out, by the task that writes them."""
 
     inputs: tuple[Key, ...]
     outputs: dict[str, tuple[Key, ...]]
@@ -61,14 +60,14 @@ class Copies:
 
 
 def copies_of(programs: Sequence[Program], bank: int, memory: CommonMemory) -> Copies:
-    """Return what a UDC with these tasks, in their order, copies; ``bank`` is the view of its registers."""
+    """Return the copies of a UDC with these tasks, in their order; ``bank`` is the view of its registers."""
     written: dict[int, str] = {}
     used: set[int] = set()
     for program in programs:
         names = {symbol.name for symbol in program.symbols.values() if symbol.scope is Scope.COMMON}
         used.update(register for name in names for register in application_registers(name, bank, memory))
         for name in lines_that_write(program):
-            # Of two tasks that write a register, the later one is the last that has written it.
+            # If two tasks write a register, the later one is its last writer.
             written.update(dict.fromkeys(_sent_with(name, bank, memory), program.name))
     every = {register for register in (*used, *written) if register in EVERY_SCAN}
     nth = {register for register in (*used, *written) if register not in EVERY_SCAN}
@@ -76,7 +75,7 @@ def copies_of(programs: Sequence[Program], bank: int, memory: CommonMemory) -> C
 
 
 def application_registers(name: str, bank: int, memory: CommonMemory) -> range:
-    """Return the application registers that a common takes, none if it stands elsewhere."""
+    """Return the application registers of a common, none if it is not on any."""
     spec = memory.specs[memory.view(name)]
     if spec.place is None or spec.place.bank != bank or spec.place.register not in APPLICATION:
         return range(0)
@@ -84,7 +83,7 @@ def application_registers(name: str, bank: int, memory: CommonMemory) -> range:
 
 
 def _sent_with(name: str, bank: int, memory: CommonMemory) -> range:
-    """Return the registers that go out when a common does."""
+    """Return the registers that are copied out with a common."""
     own = application_registers(name, bank, memory)
     if own and memory.specs[memory.view(name)].type is DataType.BOOLEAN:
         return range(own[0] & ~1, (own[0] & ~1) + 2)
@@ -96,7 +95,7 @@ def _width(spec: ViewSpec) -> int:
 
 
 def _copied(registers: Iterable[int], written: dict[int, str], bank: int, views: RegisterMap) -> Copied:
-    """Return the copies among some registers: in with all that shows them, out by the words."""
+    """Return the copies of some registers: in with all views that show them, out by whole words."""
     in_order = sorted(registers)
     inputs = views.showing(bank, [register for register in in_order if register not in written])
     outputs: dict[str, tuple[Key, ...]] = {}
@@ -108,26 +107,26 @@ def _copied(registers: Iterable[int], written: dict[int, str], bank: int, views:
 
 
 class _Trigger:
-    """Tells the module when its task may scan; the module says when a scan is due."""
+    """Reports to the module whether its task may scan; the module decides when a scan is due."""
 
     def __init__(self, module: UdcModule, task: Task) -> None:
         self._module, self.task = module, task
         self.armed = False
 
     def arm(self, first_ns: int, due: Due) -> None:  # noqa: ARG002
-        """Let the task take part in the module's scans, whenever they are."""
+        """Include the task in the module's scans, whenever they are."""
         self.armed = True
         self._module.follow()
 
     def disarm(self) -> None:
-        """Let the module's scans pass the task over."""
+        """Exclude the task from the module's scans."""
         if self.armed:
             self.armed = False
             self._module.left_out(self.task)
 
     @property
     def next_ns(self) -> int | None:
-        """The present, while it takes part: the module keeps the instant of its scans."""
+        """The present rack time while the task is included: the module keeps the instant of its scans."""
         return self._module.now_ns if self.armed else None
 
 
@@ -135,7 +134,7 @@ class UdcModule:
     """A UDC with its tasks, in the order of their drives."""
 
     def __init__(self, config: ModuleConfig, parts: RackServices) -> None:
-        """Install the tasks; nothing happens before the common clock runs."""
+        """Install the tasks; the module does nothing until the common clock runs."""
         bank = parts.backplane.bank(config.slot)
         assert bank is not None
         self.config, self._parts, self._bank = config, parts, bank.view
@@ -168,11 +167,11 @@ class UdcModule:
 
     @property
     def scan_ns(self) -> int | None:
-        """When the next scan of the module is due, None without the common clock or a task in RUN."""
+        """When the next scan of the module is due; None without the common clock or a task in RUN."""
         return None if self._event is None else self._parts.scheduler.due_ns(self._event)
 
     def power_on(self) -> None:
-        """Let the PMIs follow their lines; the common clock is off, so no scan begins."""
+        """Start the PMIs, which follow their lines; the common clock is off, so no scan starts."""
         self._pmis.begin()
 
     def power_off(self) -> None:
@@ -182,7 +181,7 @@ class UdcModule:
         self.stopped_all()
 
     def stopped_all(self) -> None:
-        """Lose what a UDC loses at STOP ALL: the locals of its tasks and its local memory (2.4.5)."""
+        """Clear what a UDC loses at STOP ALL: the locals of its tasks and its local memory (2.4.5)."""
         self._break_off()
         self._count = self._missed = 0
         self._memory.image.clear(self._local)
@@ -190,7 +189,7 @@ class UdcModule:
             item.task.lose_locals()
 
     def follow(self) -> None:
-        """Scan while the common clock runs and a task takes part, every TICKS of its intervals."""
+        """Scan every TICKS of the clock's intervals, while the common clock runs and a task is included."""
         self._pmis.follow()
         clock, running = self._parts.clock, self._taking_part()
         if not clock.runs or not running:
@@ -199,14 +198,14 @@ class UdcModule:
             self._scan_from(clock.next_ns)
 
     def left_out(self, task: Task) -> None:
-        """Go on without a task that was stopped, also where that was in the middle of its scan."""
+        """Continue without a task that was stopped, even in the middle of its scan."""
         if self._current is not None and self._current.task is task:
             self._current = None
             self._go_on_soon()
         self.follow()
 
     def state(self) -> ModuleState:
-        """Return the state of each task, the local memory, and where the module is in its scans."""
+        """Return the state of each task, the local memory, and how far the module's scan is."""
         read = self._memory.image.read_now
         held = ((view, element, read(view, element)) for view, element in self._local)
         return {
@@ -222,7 +221,7 @@ class UdcModule:
         }
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state, in the middle of a scan if need be.
+        """Restore a state, in the middle of a scan if need be.
 
         Raises:
             ValueError: it is that of a module with other tasks, or does not fit a task.
@@ -252,7 +251,7 @@ class UdcModule:
         return bool(running & own if own else running)
 
     def _trigger(self, task: Task) -> _Trigger:
-        """Make the trigger of a task as it is installed; what is copied depends on its source."""
+        """Return the trigger of a task as it is installed; the copies depend on its source."""
         self._copies = None
         self._triggers[task.name] = made = _Trigger(self, task)
         return made
@@ -275,7 +274,7 @@ class UdcModule:
         self._rest, self._current, self._scanning = [], None, False
 
     def _scan(self, now_ns: int, skipped: int) -> None:
-        """Begin a scan of the module; if the last one is still under way, its task has overlapped (code 14)."""
+        """Start a scan of the module; if the last one is still in progress, its task has overlapped (code 14)."""
         if self._current is not None:
             self._current.due(now_ns, skipped)
             return
@@ -308,7 +307,7 @@ class UdcModule:
             image.take_forced()
 
     def _go_on(self, now_ns: int) -> None:
-        """Let the next task scan; after the last one the module's scan is at its end."""
+        """Execute the next task's scan; after the last one the module's scan ends."""
         while self._rest:
             self._current = item = self._rest.pop(0)
             if self._triggers[item.name].armed and item.task.status is Status.RUNNING:
@@ -320,7 +319,7 @@ class UdcModule:
             self._end(now_ns)
 
     def _has_run(self, task: Task) -> None:
-        """Copy out what a task has written in its scan, and go on with the next one."""
+        """Copy out what a task wrote in its scan, and continue with the next task."""
         if self._current is None or self._current.task is not task or not self._scanning:
             return
         self._current = None
@@ -367,7 +366,7 @@ class UdcModule:
         return self._copies
 
     def _go_on_soon(self) -> None:
-        """Go on with the scan once what stopped its task is complete, still at this instant."""
+        """Continue the scan when the operation that stopped its task is complete, still at this instant."""
         self._parts.scheduler.at(self.now_ns, self._key, self._resume)
 
     def _resume(self, now_ns: int) -> None:

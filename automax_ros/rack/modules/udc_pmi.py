@@ -1,9 +1,9 @@
-"""The PMIs of a UDC in a running rack: when they scan, and what passes between them and the dual port.
+"""The PMIs of a UDC in a running rack: their scans, and their exchange with the dual port.
 
 A PMI scans at interrupts of its own and then sees the command registers as they are (decision). The UDC writes the
-feedback at the start of each of its scans, so that its tasks have it fresh (S-3056 p. 4-8), and counts the message.
-Without the common clock nothing is exchanged, and the communication status says so as long as a task is in RUN;
-STOP ALL and a power cycle leave feedback and status as they were (2.4.5).
+feedback at the start of each of its scans, so that it is fresh for its tasks (S-3056 p. 4-8), and counts the message.
+Without the common clock nothing is exchanged, and the communication status shows that as long as a task is in RUN; STOP
+ALL and a power cycle leave feedback and status unchanged (2.4.5).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class UdcPmis:
     """The PMIs of one UDC: one for each drive that has a plant with a motor."""
 
     def __init__(self, config: ModuleConfig, parts: RackServices, bank: int, commanded: Callable[[str], bool]) -> None:
-        """Connect the PMIs; ``commanded`` says of a drive whether a task scans that commands it."""
+        """Connect the PMIs; ``commanded`` returns whether a task that commands a drive scans."""
         plants = config.plants if isinstance(config, Driving) else {}
         self._name, self._parts, self._bank, self._commanded = config.name, parts, bank, commanded
         self._key = EventKey(EventClass.IO, config.slot, "link")
@@ -37,21 +37,21 @@ class UdcPmis:
         ]
 
     def begin(self) -> None:
-        """Let the PMIs scan from now on; those that do go on."""
+        """Start the scans of the PMIs; those that scan already continue."""
         for link in self._links:
             if link.event is None:
                 self.show(link.base + table.LINK, table.NO_CLOCK)
                 link.scan_at(self._parts.scheduler.now_ns)
 
     def exchange(self, now_ns: int) -> None:
-        """Write what the PMIs send at the start of a scan of the UDC."""
+        """Write the messages of the PMIs at the start of a scan of the UDC."""
         for link in self._links:
             link.receive(now_ns)
         if self._links:
             self._parts.tell_writes()
 
     def follow(self) -> None:
-        """Look at the common clock once what has changed is complete, still at this instant."""
+        """Check the common clock when the present change is complete, still at this instant."""
         if self._links and not self._looks:
             self._looks = True
             self._parts.scheduler.at(self._parts.scheduler.now_ns, self._key, self._look)
@@ -61,7 +61,7 @@ class UdcPmis:
         return {link.drive: link.state() for link in self._links}
 
     def load(self, state: Mapping[str, ModuleState]) -> None:
-        """Take over a state.
+        """Restore a state.
 
         Raises:
             ValueError: it is that of other drives.
@@ -75,7 +75,7 @@ class UdcPmis:
     # For the links
 
     def commands(self, link: _Link) -> Commands:
-        """Return what a PMI knows at this instant."""
+        """Return the commands and conditions that a PMI reads at this instant."""
         return Commands(
             self.read(link.base + table.CONTROL) & 0xFFFF,
             self.read(link.base + table.REFERENCE),
@@ -90,7 +90,7 @@ class UdcPmis:
         return int(self._parts.memory.read_now(self._bank, register))
 
     def show(self, register: int, value: int) -> None:
-        """Write a register where that changes it."""
+        """Write a register if its value changes."""
         memory = self._parts.memory
         if memory.read_now(self._bank, register) != value:
             memory.now_ns = self._parts.scheduler.now_ns
@@ -101,7 +101,7 @@ class UdcPmis:
         return self._parts.scheduler.at(at_ns, key, action)
 
     def _look(self, _: int) -> None:
-        """Tell of a clock that does not run while tasks do."""
+        """Show that the clock does not run while tasks do."""
         self._looks = False
         if self._parts.clock.runs:
             return
@@ -112,7 +112,7 @@ class UdcPmis:
 
 
 class _Link:
-    """What connects one PMI."""
+    """The connection of one PMI."""
 
     def __init__(self, udc: UdcPmis, drive: str, pmi: Pmi, slot: int) -> None:
         self.drive, self.base = drive, table.DRIVE_B if drive == "B" else 0
@@ -122,12 +122,12 @@ class _Link:
         self._next_ns = 0
 
     def scan_at(self, at_ns: int) -> None:
-        """Let the PMI scan next at an instant. None is left out where the host is late (decision)."""
+        """Schedule the PMI's next scan. None is left out if the host is late (decision)."""
         self._next_ns = at_ns
         self.event = self._udc.post(at_ns, self._key, self._scan)
 
     def receive(self, now_ns: int) -> None:
-        """Take the message of an instant."""
+        """Write the PMI's message of an instant into the registers."""
         udc = self._udc
         if udc.read(self.base + table.CONTROL) & table.COUNTER_RESET:
             for register in RAIL_COUNTERS[self.drive]:
@@ -144,7 +144,7 @@ class _Link:
         return {"pmi": self._pmi.state(), "next_ns": next_ns}
 
     def load(self, state: ModuleState) -> None:
-        """Take over a state.
+        """Restore a state.
 
         Raises:
             ValueError: it is not that of a PMI.

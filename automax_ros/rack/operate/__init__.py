@@ -1,1 +1,1 @@
-"""What is done to a rack: RUN, STOP, set, force, power."""
+"""Operations on a rack: RUN, STOP, set, force, power."""

@@ -1,8 +1,8 @@
-"""The forces of a rack: which variables may be held, how many, and which are (J2-3106-1 p. 18-10).
+"""The forces of a rack: which variables may be forced, how many, and which are (J2-3106-1 p. 18-10).
 
 A force holds a simple variable of any type but STRING against every write, until it is released; it survives STOP ALL
-and power. Commons are known by their names, a task's own variables with the task: ``SPEED.COUNT%``. A tunable cannot be
-forced, since nothing but the operator writes it (decision), and no output of a drive's current minor loop (52.0).
+and power. Commons are named by their names, a task's own variables with the task: ``SPEED.COUNT%``. A tunable cannot be
+forced, since only the operator writes it (decision), nor can an output of a drive's current minor loop (52.0).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from automax_ros.runtime.tasks.task import Task
 class Force:
     """A line of the force table: a variable and the value at which it is held.
 
-    ``under`` is what was written last, which the force hides; None for a local, of which none is kept.
+    ``under`` is the value written last, which the force hides; None for a local, for which none is kept.
     """
 
     name: str
@@ -34,15 +34,15 @@ class Force:
 
 
 class ForceTable:
-    """Forces the variables of one rack, within what its Executive allows."""
+    """Forces variables of one rack, within the limits of its Executive."""
 
     def __init__(self, config: RackConfig, memory: CommonMemory, tasks: Callable[[], Sequence[Task]]) -> None:
-        """Take a rack's common memory, and what tells its tasks."""
+        """Create a table without forces; ``tasks`` returns the rack's tasks."""
         self._config, self._memory, self._tasks = config, memory, tasks
         self.most = most_forces(config.executive)
 
     def table(self) -> list[Force]:
-        """Return what is forced: commons in the order of the rack file, then locals, task by task."""
+        """Return the forces: commons in the order of the rack file, then locals, task by task."""
         memory = self._memory
         held = sorted(memory.forced)
         under = {(view, element): value for view, element, value in memory.under_forces}
@@ -52,7 +52,7 @@ class ForceTable:
         ]
 
     def local(self, name: str) -> LocalElement:
-        """Return the task's own variable that a name with a point means.
+        """Return the task's own variable with a name like ``TASK.NAME``.
 
         Raises:
             NameFault: there is none.
@@ -60,11 +60,11 @@ class ForceTable:
         return local_named(self._tasks(), name)
 
     def force(self, name: str, value: Value, writer: int) -> None:
-        """Hold a variable at a value; one that is held already gets the new value.
+        """Hold a variable at a value; one that is forced already gets the new value.
 
         Raises:
             KeyError: the rack has no such variable.
-            MemoryValueError: the value does not fit, the variable cannot be forced, or as many are forced as may be.
+            MemoryValueError: the value does not fit, the variable cannot be forced, or the most that may be are forced.
         """
         if "." in name:
             self._force_local(self._known(name), value, writer)
@@ -95,14 +95,14 @@ class ForceTable:
             self._memory.release(view, element, writer)
 
     def hold_again(self, task: Task, forces: Mapping[str, Value], writer: int) -> list[str]:
-        """Hold the locals of a task that was installed as before; return those that it has not, which are released."""
+        """Restore the forces of a task after its installation; return the names that it lacks, which are released."""
         symbols = task.compiled.program.symbols
         kept = {name: value for name, value in forces.items() if name in symbols and _may_be_held(task, name)}
         self._hold(task, kept, writer)
         return [f"{task.name}.{name}" for name in forces if name not in kept]
 
     def load(self) -> None:
-        """Take over what tasks hold that went on from a state."""
+        """Update memory after tasks were restored from a state: whether any local is forced."""
         self._memory.note_locals(forced=self._any_local(), told=False)
 
     def _force_local(self, meant: LocalElement, value: Value, writer: int) -> None:
@@ -146,7 +146,7 @@ class ForceTable:
         return f"{memory.specs[others[0]].name} is part of the same register" if others else None
 
     def _too_many(self, *, again: bool) -> str | None:
-        """Return the reason where one more is too many; a variable that is forced ``again`` is no more than before."""
+        """Return the reason if one more is too many; a variable that is forced ``again`` does not count."""
         if again or len(self.table()) < self.most:
             return None
         version = version_text(self._config.executive)

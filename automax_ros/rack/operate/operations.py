@@ -1,8 +1,6 @@
-"""What an operator does to a rack: RUN, STOP, reload, delete, STOP ALL, clear, power. Each any number of times.
+"""Operations of an operator on a rack: RUN, STOP, reload, delete, STOP ALL, clear, power. Each any number of times.
 
-Stimuli, services, commands and lifecycle transitions all call these; observers see each, refused ones too.
-
-What common memory holds before a rack starts.
+Stimuli, services, commands and lifecycle transitions all call these; observers receive each, refused ones too.
 """
 
 from __future__ import annotations
@@ -32,7 +30,7 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEv
 
 
 def begin_memory(config: RackConfig, inputs: ProcessInputs, memory: CommonMemory) -> None:
-    """Write the presets of the rack's file, as the rack itself."""
+    """Write the presets of the rack's file, with the rack as the writer."""
     for variable in config.variables:
         for element, value in enumerate(variable.presets):
             inputs.write_from_outside(memory.view(variable.name), value, PRESET_WRITER, element)
@@ -52,10 +50,10 @@ _POWER = EventKey(EventClass.OUTSIDE, 0, "power")
 
 
 class Operations:
-    """Operates one rack. ``stopped`` is what stopped all tasks, None while the rack runs.
+    """Operates one rack. ``stopped`` is the cause of a STOP ALL, None while the rack runs.
 
-    ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that cannot run until
-    they are reloaded; ``battery_good`` is what BATTERYSTATUSn@ show. ``installation`` prepares what ``install`` takes.
+    ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that cannot run until they are
+    reloaded; ``battery_good`` is the value of BATTERYSTATUSn@. ``installation`` prepares sources for ``install``.
     """
 
     def __init__(
@@ -71,7 +69,7 @@ class Operations:
         forcing: ForceTable,
         elsewhere: frozenset[tuple[int, int]] = frozenset(),
     ) -> None:
-        """Take the parts of a rack; ``elsewhere`` (views and elements) are modules' of other processes: not cleared."""
+        """Create from the parts of a rack; ``elsewhere`` (views and elements in other processes) is not cleared."""
         self._elsewhere = elsewhere
         self._forcing = forcing
         self._events, self._channels = events, channels
@@ -91,15 +89,16 @@ class Operations:
 
     @property
     def stop_reason(self) -> str | None:
-        """Why all tasks were stopped, None while the rack runs."""
+        """Why all tasks were stopped; None while the rack runs."""
         return None if self.stopped is None else self.stopped.reason
 
     def start(self, first: Callable[[], None] | None = None, *, joining: bool = False) -> None:
-        """Begin what modules do by themselves, and put tasks into RUN with their first scan at this instant.
+        """Power the modules on, and put tasks into RUN with their first scan at this instant.
 
-        These are all tasks, or those of ``starting`` where that is known: the ones that ran before a power-up. With
-        ``joining`` others run this rack: first scans come at the next ticks, and none where it is stopped. ``first`` is
-        called before any start-up part: what it operates takes the tasks for running, and settles which of them begin.
+        These are all tasks, or those of ``starting`` if it is set: the tasks that ran before a power-up. With
+        ``joining`` other processes run this rack already: first scans come at the next ticks, and none if it is
+        stopped. ``first`` is called before any start-up part: for its operations the tasks count as running, and they
+        decide which of them start.
         """
         for module in self._modules:
             module.power_on()
@@ -129,10 +128,10 @@ class Operations:
         self._tell("run", name)
 
     def run_all(self) -> None:
-        """Put all tasks that do not run into RUN, in the order of priority and name; those that were deleted stay out.
+        """Put all tasks that do not run into RUN, in the order of priority and name, except deleted ones.
 
         Raises:
-            OperationRefused: the error log of a task that has faulted was not cleared since, or the power is off.
+            OperationRefused: a task has faulted and its error log was not cleared since, or the power is off.
         """
         self._need_power("run_all")
         resting = [item for item in self._in_starting_order() if item.name not in self.deleted and not self._runs(item)]
@@ -141,7 +140,7 @@ class Operations:
         self._tell("run_all")
 
     def stop(self, name: str) -> None:
-        """Stop a task; its locals keep the values of its last whole scan. One that does not run stays as it is.
+        """Stop a task; its locals keep the values of its last whole scan. Do nothing to one that does not run.
 
         Raises:
             OperationRefused: there is no such task, it is critical (J2-3106-1 p. 8-2), or the power is off.
@@ -153,7 +152,7 @@ class Operations:
         self._tell("stop", name)
 
     def stop_tasks(self) -> None:
-        """Stop all tasks; memory keeps what it holds."""
+        """Stop all tasks; memory is unchanged."""
         for item in self._tasks.values():
             item.stop()
         self._beginning.clear()
@@ -178,7 +177,7 @@ class Operations:
         self._tell("stop_all", task, reason=reason, detail=code or "")
 
     def clear_errors(self, name: str | None = None) -> None:
-        """Clear the error log of a task or of all; a faulted task is a stopped one then, and can be put into RUN.
+        """Clear the error log of a task or of all; a faulted task becomes a stopped one, which can be put into RUN.
 
         Raises:
             OperationRefused: there is no such task, or the power is off.
@@ -194,10 +193,10 @@ class Operations:
     def reload(self, name: str, source: SourceText, *, keep_state: bool = False) -> None:
         """Replace a task's source while the others run: an installation, so locals are 0, tunables as the source says.
 
-        What is forced stays so as far as the new source has a simple local of that name, else it is released, and
-        observers are told so (decision). With ``keep_state`` locals and tunables keep their values by name, as far as
-        they fit (``carry_over``). A task that ran is put into RUN again. With errors in the source the old task goes
-        on. One that was deleted is there again.
+        Forces stay if the new source has a simple local of that name, else they are released, and observers are
+        notified (decision). With ``keep_state`` locals and tunables keep their values by name, if they fit
+        (``carry_over``). A task that ran is put into RUN again. If the source has errors the old task continues. A
+        deleted task is restored.
 
         Raises:
             OperationRefused: there is no such task, it runs and is critical (decision: it would stop alone), or the
@@ -208,7 +207,7 @@ class Operations:
         self.install(self.installation.prepare(name, source), keep_state=keep_state)
 
     def admit_reload(self, name: str) -> None:
-        """Do nothing where a task may be reloaded now, whatever its new source is.
+        """Check that a task may be reloaded now, whatever its new source is.
 
         Raises:
             OperationRefused: as ``reload``.
@@ -216,7 +215,7 @@ class Operations:
         self._refuse_critical("reload", self.find("reload", name))
 
     def install(self, prepared: PreparedReload, *, keep_state: bool = False) -> None:
-        """Do what is left of a ``reload`` whose source was prepared, while no other task was reloaded since.
+        """Finish a ``reload`` whose source was prepared, if no other task was reloaded since.
 
         Raises:
             OperationRefused, RackError: as ``reload``.
@@ -230,7 +229,7 @@ class Operations:
             self._tell("reload", name, ok=False, reason=str(error))
             raise
         ran = item.task.status is Status.RUNNING
-        item.stop()  # A scan under way is given up first: only then the task's values are whole.
+        item.stop()  # A scan in progress is abandoned first: only then the task's values are consistent.
         before, values, forces = item.task.layout, item.task.snapshot(), item.task.forces
         item.install(compiled, source)
         if keep_state:
@@ -243,7 +242,7 @@ class Operations:
             self._run_together([item], self._next_tick)
 
     def delete(self, name: str) -> None:
-        """Take a resting task out of the rack: it holds nothing and cannot run until it is reloaded (decision).
+        """Delete a resting task: it loses all its values and cannot run until it is reloaded (decision).
 
         Raises:
             OperationRefused: there is no such task, it runs, it was deleted already, or the power is off.
@@ -261,7 +260,7 @@ class Operations:
         self._tell_released(item, released)
 
     def power(self, off_for_ns: int, *, battery: bool = True) -> None:
-        """Switch the power off, and let it come back after a time, at the latest with ``power_on``.
+        """Switch the power off, and on again after a time, unless ``power_on`` does so before.
 
         Raises:
             OperationRefused: it is off already.
@@ -294,9 +293,9 @@ class Operations:
         """Switch the power on again.
 
         Without a good ``battery`` non-volatile commons, locals, tunables, error logs and forces are as at installation;
-        the tasks themselves are there again, as if somebody had loaded them (decision).
-        With ``auto_run`` (else as the rack file says) the tasks that ran when the power went are put into RUN
-        (J2-3106-1 p. 12-4); a task that was stopped, or that a fault has stopped, was not running then.
+        the tasks themselves are there again, as if they had been loaded (decision). With ``auto_run`` (else as the rack
+        file says) the tasks that ran when the power went are put into RUN (J2-3106-1 p. 12-4); a task that was stopped,
+        or that a fault has stopped, was not running then.
 
         Raises:
             OperationRefused: it is on.
@@ -320,13 +319,13 @@ class Operations:
             self._run_together(again, self._next_tick)
 
     def state(self) -> OperationsState:
-        """Return how the rack stands."""
+        """Return the operating state."""
         return OperationsState(
             self.powered, self.battery_good, self.stopped, self.ran_at_power_off, self.deleted, self._power_return
         )
 
     def load(self, state: OperationsState) -> None:
-        """Take over how the rack stands."""
+        """Restore an operating state."""
         self.powered, self.battery_good, self.stopped = state.powered, state.battery_good, state.stopped
         self.ran_at_power_off, self.deleted = state.ran_at_power_off, state.deleted
         self._expect_power(state.power_return)
@@ -375,7 +374,7 @@ class Operations:
             )
 
     def _hold_again(self, item: ScheduledTask, forces: Mapping[str, Value]) -> list[str]:
-        """Hold those locals of an installed task that it still has; return the others, which are released."""
+        """Restore the forces of an installed task; return the names that it lacks, which are released."""
         self._memory.now_ns = self._scheduler.now_ns
         released = self._forcing.hold_again(item.task, forces, PRESET_WRITER)
         self._observers.tell_writes()
@@ -400,7 +399,7 @@ class Operations:
             self._refuse(what, faulted[0], f"a fault has stopped {' '.join(faulted)}: clear the error log first")
 
     def find(self, what: str, name: str) -> ScheduledTask:
-        """Return a task that an operation concerns.
+        """Return the task of an operation.
 
         Raises:
             OperationRefused: there is no such task, or the power is off.

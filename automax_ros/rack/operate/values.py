@@ -1,7 +1,7 @@
-"""What an operator does to values: force and release, set, tune. Each is told to observers, refused ones too.
+"""Operations of an operator on values: force and release, set, tune. Observers receive each, refused ones too.
 
 Names are full ones: ``REF%``, ``TABLE%(3)``, a local or a tunable with its task: ``SPEED.COUNT%``, ``SPEED.KP``.
-``Rack.force``, ``Rack.write`` and ``Rack.tune`` do the same for programs, and tell of no operation.
+``Rack.force``, ``Rack.write`` and ``Rack.tune`` do the same for programs, without reporting an operation.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from automax_ros.runtime.time.scheduler import Scheduler
 
 Tune = Callable[[Task, str, object], None]
 _UNTOLD = ""
-"""The name of an operation that observers are not told of."""
+"""Name of an operation that is not reported to observers."""
 
 
 class ValueOperations:
@@ -46,13 +46,13 @@ class ValueOperations:
         observers: Observers,
         tune: Tune,
     ) -> None:
-        """Take the parts of a rack; ``tune`` is how it sets a tunable."""
+        """Create from the parts of a rack; ``tune`` sets a tunable."""
         self._config, self._operations = config, operations
         self._memory, self._inputs = memory, inputs
         self._forcing, self._scheduler, self._observers, self._tune = forcing, scheduler, observers, tune
 
     def force(self, name: str, value: Value) -> None:
-        """Hold a common or a local at a value against every write; one that is held already gets the new value.
+        """Hold a common or a local at a value against every write; one that is forced already gets the new value.
 
         Raises:
             OperationRefused: there is no such variable, it cannot be forced, the value does not fit, as many are forced
@@ -63,7 +63,7 @@ class ValueOperations:
         self._tell("force", task, detail=_assignment(label, value))
 
     def unforce(self, names: Sequence[str] | None = None) -> None:
-        """End forces, all of them without ``names``; the values stay until the next write.
+        """End forces, all of them if ``names`` is None; the values stay until the next write.
 
         Raises:
             OperationRefused: one of the names is not a variable or not forced, or the power is off; nothing is
@@ -92,7 +92,7 @@ class ValueOperations:
         self._tell("set", detail=_assignment(label, value))
 
     def write(self, name: str, value: Value) -> None:
-        """Do what ``set`` does as one of many samples: nobody is told of an operation, the write log has it (decision).
+        """Do the same as ``set`` for one of many samples: no operation is reported, the write log has it (decision).
 
         Raises:
             OperationRefused: as ``set``.

@@ -1,1 +1,1 @@
-"""What a person asks of a rack: requests in words, switches, halting, what outlives the power."""
+"""Requests of an operator to a rack: commands in words, switches, halting, state kept over the power."""

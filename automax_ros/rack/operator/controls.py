@@ -1,7 +1,7 @@
-"""What a person moves or breaks in and around a rack: controls of modules, faults of plants.
+"""Operations in and around a rack by hand: controls of modules, faults of plants.
 
-Stimuli, services and commands call this; observers are told of each, of refused ones too. Neither needs the rack's
-power (decision): a switch is a lever, and a plant stands outside.
+Stimuli, services and commands call them; observers receive each, refused ones too. Neither needs the rack's power
+(decision): a switch is a lever, and a plant is outside the rack.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from automax_ros.rack.modules.module import Operable
 from automax_ros.rack.rack import Rack
 
 MOST_CHARACTERS = 100
-"""Longest text of a value that is looked at (decision: a bound on what strangers send)."""
+"""Longest text of a value that is accepted (decision: a bound on what strangers send)."""
 
 
 class SwitchOperations:
     """The controls of one rack.
 
     Raises:
-        OperationRefused: all methods, where there is no such thing, it has no such control, or it cannot be moved so.
+        OperationRefused: all methods, if the module, plant or control does not exist, or the control cannot be moved
+            so.
     """
 
     def __init__(self, rack: Rack) -> None:
@@ -71,7 +72,7 @@ class SwitchOperations:
         self._tell("plant", told)
 
     def load(self, name: str, torque_nm: float) -> None:
-        """Load a plant's shaft (N m) as one of many samples: nobody is told of an operation (decision)."""
+        """Load a plant's shaft (N m) as one of many samples: no operation is reported (decision)."""
         plant = self._rack.plants.get(name)
         if plant is None:
             raise OperationRefused(f"the rack has no plant {quoted(name)}")

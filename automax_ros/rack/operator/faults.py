@@ -1,13 +1,11 @@
-"""The drive faults that stand in the current minor loops of a rack, in words, with the time at which each came.
+"""The codes on the displays of a rack's Processors, and the latched drive faults of its current minor loops.
 
-What the displays of a rack's Processors show: the code of a fault or of a status, or nothing.
-
-A code of a STOP ALL is shown by the Processor whose task has caused it; where no Processor's task has (a UDC's has, a
-module was lost, two drive the common clock) by all of them, since the tasks of all have stopped, until the rack runs
-again (decision). A code that stands in the error log of a task, which 87 for a shorted SCR does without a STOP ALL
-(52.3.1), is shown until that log is cleared (decision: J2-3106-1 names both in one step). A Processor that has
-nothing to tell, and one without power, shows nothing (decision). The codes d0 and E0 are of an installation, which
-takes no time here and is refused with the errors' own words: no rack that answers shows them (decision).
+The code of a STOP ALL is shown by the Processor whose task caused it; if no Processor's task did (a UDC's did, a module
+was lost, two drive the common clock) by all of them, since the tasks of all have stopped, until the rack runs again
+(decision). A code in the error log of a task, such as 87 for a shorted SCR without a STOP ALL (52.3.1), is shown until
+that log is cleared (decision: J2-3106-1 names both in one step). A Processor without a code, and one without power,
+shows nothing (decision). The codes d0 and E0 belong to an installation, which takes no time here and is refused with
+the errors' own words: no rack that answers shows them (decision).
 """
 
 from __future__ import annotations
@@ -36,12 +34,12 @@ MEANINGS = {
     "E0": "a task and the configuration do not agree",
     "d0": "tasks are being installed",
 }
-"""The codes of which the meaning is known, in words; the whole table of the manuals is not."""
+"""Meanings of the codes that are known; the whole table of the manuals is not."""
 
 
 @dataclass(frozen=True)
 class Display:
-    """The display of one Processor: ``code`` is "" where it is blank, ``meaning`` says in words what it shows."""
+    """The display of one Processor: ``code`` is "" if it is blank, ``meaning`` is its meaning in words."""
 
     module: str
     code: str
@@ -49,7 +47,7 @@ class Display:
 
 
 def displays_of(rack: Rack) -> list[Display]:
-    """Return what the displays of a rack's Processors show now, as far as they are in this process, by slot."""
+    """Return what the displays of the Processors in this process show now, by slot."""
     return [
         _display(rack, module.config.name, [item.name for item in module.tasks])
         for module in rack.modules
@@ -58,7 +56,7 @@ def displays_of(rack: Rack) -> list[Display]:
 
 
 def meaning_of(code: str) -> str:
-    """Return what a code means in words."""
+    """Return the meaning of a code in words."""
     return MEANINGS.get(code, "a code of which the meaning is not known")
 
 
@@ -71,7 +69,7 @@ def _display(rack: Rack, module: str, tasks: list[str]) -> Display:
 
 
 def _codes(rack: Rack, tasks: list[str]) -> Iterator[str]:
-    """Yield the codes that concern a Processor with these tasks, the one that it shows first."""
+    """Yield the codes that concern a Processor with these tasks, the one to be shown first."""
     cause = rack.operations.stopped
     if cause is not None and cause.code and _concerns(rack, cause.task, tasks):
         yield cause.code
@@ -80,7 +78,7 @@ def _codes(rack: Rack, tasks: list[str]) -> Iterator[str]:
 
 
 def _concerns(rack: Rack, task: str, tasks: list[str]) -> bool:
-    """Return whether a stop that a task has caused ("" is none) is shown by the Processor with these tasks."""
+    """Return whether the Processor with these tasks shows a stop that ``task`` caused ("" is none)."""
     if not _is_on_processor(rack, task):
         return True
     return task in tasks and rack.task(task).errors.count > 0
@@ -92,7 +90,7 @@ def _is_on_processor(rack: Rack, task: str) -> bool:
 
 
 def _logged(log: ErrorLog) -> Iterator[str]:
-    """Yield the codes that a log holds, the newest first."""
+    """Yield the codes in a log, the newest first."""
     return (entry.hardware for entry in reversed(log.entries) if entry.hardware)
 
 
@@ -100,16 +98,16 @@ _PROBLEMS = frozenset(kind.problem for kind in KINDS)
 
 
 class DriveTrips:
-    """Observes one rack and notes when drive faults come; a fault from before is told without its time."""
+    """Observes one rack and records when drive faults come; an earlier fault is listed without its time."""
 
     def __init__(self, rack: Rack) -> None:
-        """Begin to observe."""
+        """Start to observe the rack."""
         self._rack = rack
         self._times: dict[tuple[str, int], int] = {}
         rack.observe(self)
 
     def lines(self) -> list[str]:
-        """Return a line for each fault that is latched: ``CML: tach loss at 188.9 s, not cleared``."""
+        """Return a line for each latched fault: ``CML: tach loss at 188.9 s, not cleared``."""
         return [
             f"{task.name}: {_words(kind.problem)}{self._time(task.name, kind.problem)}, not cleared"
             for task in self._rack.tasks
@@ -121,19 +119,19 @@ class DriveTrips:
     # RackObserver
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
-        """Note when a drive fault was logged."""
+        """Record when a drive fault was logged."""
         for _, code in record.errors:
             if code in _PROBLEMS:
                 self._times[task.name, code] = record.time_ns
 
     def written(self, writes: list[WriteGroup]) -> None:
-        """Writes from outside are not drive faults."""
+        """Do nothing: writes from outside are not drive faults."""
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """A tunable that is set is not a drive fault."""
+        """Do nothing: a tunable that is set is not a drive fault."""
 
     def operated(self, operation: Operation) -> None:
-        """An operation is not a drive fault."""
+        """Do nothing: an operation is not a drive fault."""
 
     def _time(self, task: str, problem: int) -> str:
         at_ns = self._times.get((task, problem))

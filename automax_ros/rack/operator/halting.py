@@ -1,8 +1,8 @@
-"""A rack that keeps pace with the wall clock is halted, goes on by scans and ticks, and resumes.
+"""Halts a rack that keeps pace with the wall clock, steps it by scans and ticks, and resumes it.
 
-While it is halted rack time stands still: no scan, no plant and no timeout goes on, and nothing is late afterwards.
-Operations and writes are carried out at the instant at which it stands. A step lets single events happen at their
-instants, as simulated time does, and halts again.
+While it is halted rack time is frozen: scans, plants and timeouts wait, and nothing is late afterwards. Operations and
+writes are executed at the frozen instant. A step executes single events at their instants, as simulated time does, and
+halts again.
 """
 
 from __future__ import annotations
@@ -21,33 +21,33 @@ from automax_ros.runtime.tasks.task import Status
 LONGEST_STEP_NS = NS_PER_S
 """Most rack time of one step (decision: whoever waits for the rack meanwhile does not wait long)."""
 DONE, TIME_OVER, STOPPED = "done", "the time is over", "STOP ALL"
-"""Why a step ends."""
+"""The reasons for which a step ends."""
 
 
 @runtime_checkable
 class Haltable(Protocol):
-    """What keeps pace and can let time stand still; it calls ``while_halted`` every now and then meanwhile."""
+    """A pacer that can freeze rack time; meanwhile it calls ``while_halted`` repeatedly."""
 
     halted: bool
     while_halted: Callable[[], object]
 
     def halt(self) -> None:
-        """Let time stand still."""
+        """Freeze rack time."""
         ...
 
     def resume(self) -> None:
-        """Let time go on from where it stands."""
+        """Continue rack time from where it is frozen."""
         ...
 
 
 def is_halted(pace: object) -> bool:
-    """Return whether what keeps a rack's pace lets its time stand still."""
+    """Return whether a rack's pacer has frozen its time."""
     return isinstance(pace, Haltable) and pace.halted
 
 
 @dataclass(frozen=True)
 class Stepped:
-    """How a step ended: why, at which rack time, and how many scans all tasks have ended in it."""
+    """Result of a step: why and at which rack time it ended, and how many scans of all tasks ended in it."""
 
     why: str
     at_ns: int
@@ -58,23 +58,23 @@ class Halting:
     """Halts, steps and resumes one rack.
 
     Raises:
-        OperationRefused: all methods, where that cannot be done now; observers are told so.
+        OperationRefused: all methods, if the operation is not possible now; observers receive the refusal.
     """
 
     def __init__(self, rack: Rack, pace: object) -> None:
-        """Take a rack and what keeps its pace."""
+        """Create from a rack and its pacer."""
         self._rack, self._pace = rack, pace
 
     @property
     def halted(self) -> bool:
-        """Whether rack time stands still."""
+        """Whether rack time is frozen."""
         return is_halted(self._pace)
 
     def halt(self) -> None:
-        """Let rack time stand still.
+        """Freeze rack time.
 
-        A rack of which this process holds a part is not halted: the others would go on (decision). One that follows
-        another's clock is halted by that clock alone.
+        A rack of which this process holds a part is not halted: the others would continue (decision). A rack that
+        follows another's clock can be halted only by that clock.
         """
         if not self._rack.part.is_whole:
             self._refuse(HALT, "the rack runs in several processes, which do not halt together")
@@ -85,7 +85,7 @@ class Halting:
         self._tell(HALT)
 
     def resume(self) -> None:
-        """Let rack time go on from where it stands."""
+        """Continue rack time from where it is frozen."""
         pace = self._haltable(RESUME)
         if not pace.halted:
             self._refuse(RESUME, "the rack is not halted")
@@ -93,9 +93,9 @@ class Halting:
         self._tell(RESUME)
 
     def step(self, what: str, task: str = "", count: int = 1, until_ns: int = 0) -> Stepped:
-        """Go on by scans or ticks, or until a rack time: ``scan``, ``tick``, ``until``.
+        """Execute scans or ticks, or run until a rack time: ``scan``, ``tick``, ``until``.
 
-        A ``task`` is whose scan is meant, or whose Processor's tick; "" is any, and the first module with tasks.
+        ``task`` selects whose scans count, or whose Processor's ticks; "" is any task, and the first module with tasks.
         """
         steps: Mapping[str, Callable[[], Stepped]] = {
             "scan": lambda: self._scans(task, count),
@@ -140,7 +140,7 @@ class Halting:
         return self._go(for_ns, None)
 
     def _go(self, for_ns: int, is_done: Callable[[], bool] | None) -> Stepped:
-        """Let events happen for a time at most; without ``is_done`` the end of the time is what was wanted."""
+        """Execute events for ``for_ns`` at most; without ``is_done`` the step is done when that time is over."""
         rack = self._rack
         ran, before, end_ns = rack.operations.stopped is None, self._all_scans(), rack.now_ns + for_ns
         why = DONE if is_done is None else TIME_OVER

@@ -1,4 +1,4 @@
-"""The tasks of one module operated together: what the transitions of its node do. All of them, or none."""
+"""Operates all tasks of one module together, as its node's transitions do. All of them, or none."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ModuleTasks:
     """Operates the tasks of one module of a rack, between two scans.
 
     Raises:
-        OperationRefused: ``run``, ``stop`` and ``delete``, where the rack refuses one task; then none is changed.
+        OperationRefused: ``run``, ``stop`` and ``delete``, if the rack refuses one task; then none is changed.
     """
 
     def __init__(self, rack: Rack, module: Module) -> None:
@@ -28,21 +28,21 @@ class ModuleTasks:
 
     @property
     def deleted(self) -> list[str]:
-        """The tasks that were taken out of the rack."""
+        """The tasks that were deleted."""
         return [item.name for item in self._items if item.name in self._rack.operations.deleted]
 
     @property
     def are_deleted(self) -> bool:
-        """Whether the module has tasks, and none of them is there."""
+        """Whether the module has tasks, and all of them are deleted."""
         return bool(self._items) and len(self.deleted) == len(self._items)
 
     @property
     def is_running(self) -> bool:
-        """Whether one of them at least is in RUN."""
+        """Whether at least one of them is in RUN."""
         return any(map(_runs, self._items))
 
     def run(self) -> None:
-        """Put those that rest into RUN, in the order of priority and name; those that were deleted stay out."""
+        """Put tasks at rest into RUN, in the order of priority and name, except deleted ones."""
         resting = [item for item in self._items if not _runs(item) and item.name not in self.deleted]
         order = sorted(resting, key=lambda item: (item.task.priority, item.name))
         for item in _first(order, lambda item: item.task.status is Status.FAULTED):
@@ -55,15 +55,15 @@ class ModuleTasks:
             self._rack.operations.stop(item.name)
 
     def delete(self) -> None:
-        """Take them all out of the rack."""
+        """Delete all of them."""
         there = [item for item in self._items if item.name not in self.deleted]
         for item in _first(there, _runs):
             self._rack.operations.delete(item.name)
 
     def source(self, name: str) -> SourceText:
-        """Return the source of a task as it stands on the disk now; any thread may ask.
+        """Return the source of a task as it is on the disk now; safe on any thread.
 
-        A file that has lain in the rack file's folder and does not any more is not read (decision: a link may have been
+        A file that was in the rack file's folder and is outside now is not read (decision: a link may have been
         exchanged since the rack file was checked).
 
         Raises:
@@ -83,5 +83,5 @@ def _runs(item: ScheduledTask) -> bool:
 
 
 def _first(items: list[ScheduledTask], refused: Callable[[ScheduledTask], bool]) -> list[ScheduledTask]:
-    """Put those that the rack will refuse first: then nothing has been changed when it does."""
+    """Sort tasks that the rack will refuse to the front: then nothing has been changed when it does."""
     return sorted(items, key=lambda item: not refused(item))

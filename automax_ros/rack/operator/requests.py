@@ -1,9 +1,8 @@
-"""What an operator reads of a rack by names and patterns: values as a program writes them, and in their units.
+"""Requests of an operator to a rack in words: names and values as texts, from services and commands.
 
-What an operator asks of a rack in words: names and values as texts, as services and commands bring them.
-
-A text that means nothing is refused with a reason, and the refusal is told to observers, as the rack's own refusals
-are. Everything but ``prepare`` happens between two scans: whoever calls has seen to that.
+Text that cannot be parsed is refused with a reason, and observers receive the refusal, as they do the rack's own.
+Values are read by names and patterns, as a program writes them and in their units. Everything but ``prepare`` must be
+called between two scans.
 """
 
 from __future__ import annotations
@@ -32,14 +31,14 @@ from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.reading.files import MAX_BYTES
 
 MAX_VALUE = 1000
-"""Longest text of a value that is looked at, in characters (decision: likewise)."""
+"""Longest text of a value that is accepted, in characters (decision: likewise)."""
 MOST_OFF_S = 86_400
 """Longest time for which the power is switched off, s (decision: a day)."""
 _MOST_FINDINGS = 100
 
 
 class ReloadRefused(OperationRefused):
-    """A source was not taken; ``findings`` are what its check found, each as a text of several lines."""
+    """A source was refused; ``findings`` are those of its check, each as a text of several lines."""
 
     def __init__(self, reason: str, findings: Sequence[str]) -> None:
         super().__init__(reason)
@@ -47,10 +46,10 @@ class ReloadRefused(OperationRefused):
 
 
 class OperatorRequests:
-    """Carries out what is asked of one rack.
+    """Executes an operator's requests to one rack.
 
     Raises:
-        OperationRefused: all methods, where the rack refuses or a text means nothing.
+        OperationRefused: all methods, if the rack refuses or a text cannot be parsed.
     """
 
     def __init__(self, rack: Rack) -> None:
@@ -74,11 +73,11 @@ class OperatorRequests:
         self._rack.operations.stop_all("STOP ALL by the operator")
 
     def clear_errors(self, task: str = "") -> None:
-        """Clear the error log of a task, of all without a name."""
+        """Clear the error log of a task, or of all without a name."""
         self._rack.operations.clear_errors(self._task("clear_errors", task) if task.strip() else None)
 
     def delete(self, task: str) -> None:
-        """Take a resting task out of the rack; a reload brings it back."""
+        """Delete a resting task; a reload brings it back."""
         self._rack.operations.delete(self._task("delete", task))
 
     def power(self, what: str, off_for_s: float = 0.0, *, without_battery: bool = False) -> None:
@@ -130,18 +129,18 @@ class OperatorRequests:
         SwitchOperations(self._rack).plant(name.strip().upper(), verb.strip(), value.strip())
 
     def reload(self, task: str, source: str, *, keep_state: bool = False) -> list[str]:
-        """Replace a task's source by a text; return what its check found, short of errors.
+        """Replace a task's source by a text; return the warnings of its check.
 
         Raises:
-            ReloadRefused: the source has errors; the old one goes on.
+            ReloadRefused: the source has errors; the old one continues.
         """
         self.install(self.prepare(*self.admit_reload(task, source)), keep_state=keep_state)
         return []
 
     def admit_reload(self, task: str, source: str) -> tuple[str, SourceText]:
-        """Return the task that a reload concerns and its new source: first part of a reload, short.
+        """Return the task of a reload and its new source: first part of a reload, short.
 
-        What is found is named by the task, such as ``SPEED.BLK:1:1``: the text is not the rack's file (decision).
+        Findings name the task, such as ``SPEED.BLK:1:1``: the text is not the rack's file (decision).
         """
         name = self._task("reload", task)
         if len(source) > MAX_BYTES:
@@ -154,16 +153,16 @@ class OperatorRequests:
         return self._rack.operations.installation.prepare(name, source)
 
     def is_current(self, prepared: PreparedReload) -> bool:
-        """Return whether a source was prepared for the tasks as they are now; else it is prepared again."""
+        """Return whether a source was prepared for the tasks as they are now; else it must be prepared again."""
         return self._rack.operations.installation.is_current(prepared)
 
     def install(self, prepared: PreparedReload, *, keep_state: bool = False) -> str:
-        """Let the task have its prepared source: last part of a reload, short.
+        """Install the prepared source of a task: last part of a reload, short.
 
-        Returns in words which tuned values it has lost, "" where none: an installation takes them from the source.
+        Returns in words which tuned values the task has lost, "" if none: an installation takes them from the source.
 
         Raises:
-            ReloadRefused: the source has errors; the old one goes on.
+            ReloadRefused: the source has errors; the old one continues.
         """
         tuned = self._tuned(prepared.task)
         try:
@@ -174,7 +173,7 @@ class OperatorRequests:
         return self._lost(prepared.task, tuned)
 
     def _tuned(self, name: str) -> dict[str, Value]:
-        """Return the tunables of a task that are not as its source says, with their values."""
+        """Return the tunables of a task that differ from its source, with their values."""
         task = self._rack.task(name)
         values = {item.name: (task.value(item.name), item.initial) for item in task.layout.fields if _is_tunable(item)}
         return {key: held for key, (held, initial) in values.items() if held != initial and not isinstance(held, list)}
@@ -198,7 +197,7 @@ class OperatorRequests:
         return [(item.name, item.value) for item in self.read(names)]
 
     def read(self, names: Sequence[str]) -> list[Reading]:
-        """Return the same with units, and what patterns mean."""
+        """Return the same with units; names may be patterns."""
         return self._readings.get(self._few("get", names))
 
     def forces(self) -> list[tuple[str, str]]:
@@ -206,15 +205,15 @@ class OperatorRequests:
         return [(item.name, source_text(item.value)) for item in self._rack.forces()]
 
     def tasks_named(self, task: str) -> list[str]:
-        """Return a task, all of the rack without a name."""
+        """Return a task, or all of the rack without a name."""
         return self._readings.tasks_named(task)
 
     def task_word(self, task: str) -> str:
-        """Return what a task's name is looked up as, "" where none is given."""
+        """Return a task's name in the form for a look-up, "" if none is given."""
         return self._task("step", task)
 
     def _common_value(self, what: str, name: str, text: str) -> Value:
-        """Return the value that a text writes for a variable; a name that is none is left for the rack to refuse."""
+        """Return the value that a text writes for a variable; an unknown name is left for the rack to refuse."""
         self._named(what, name)
         if "." in name:
             return self._value(what, name, text, type_of_name("".join(name.split()).upper()), 0)
@@ -266,7 +265,7 @@ def _source_value(value: Value | list[Value] | None) -> str:
 
 
 MAX_NAME = 100
-"""Longest name that is looked at, in characters (decision: a bound on what strangers send)."""
+"""Longest name that is accepted, in characters (decision: a bound on what strangers send)."""
 MAX_NAMES = 1000
 """Most names in one request, and most values that its patterns mean (decision: likewise)."""
 _WILD = "*?"
@@ -274,7 +273,7 @@ _WILD = "*?"
 
 @dataclass(frozen=True)
 class Reading:
-    """A value that was read; ``shown`` is what it means in its unit, such as ``7.5 bar``, "" without one."""
+    """A value that was read; ``shown`` is it in its unit, such as ``7.5 bar``, "" without one."""
 
     name: str
     value: str
@@ -282,10 +281,11 @@ class Reading:
 
 
 class Readings:
-    """Reads one rack.
+    """Reads values of one rack.
 
     Raises:
-        OperationRefused: all methods, where a name means nothing. Nobody is told: a question is not an operation.
+        OperationRefused: all methods, if a name means nothing. Observers are not notified: a question is not an
+            operation.
     """
 
     def __init__(self, rack: Rack) -> None:
@@ -295,7 +295,7 @@ class Readings:
         """Return commons, their elements, and variables of tasks (``TASK.NAME``), each once.
 
         A name may be a pattern: ``*`` stands for any characters, ``?`` for one. ``F_*`` means simple commons,
-        ``TABLE%(*)`` elements, ``SPEED.*`` what a task has of its own (decision).
+        ``TABLE%(*)`` elements, ``SPEED.*`` a task's own variables (decision).
         """
         found: dict[str, Reading] = {}
         for name in names:
@@ -307,7 +307,7 @@ class Readings:
         return list(found.values())
 
     def tasks_named(self, task: str) -> list[str]:
-        """Return a task, all of the rack without a name."""
+        """Return a task, or all of the rack without a name."""
         return [self._known(task)] if task.strip() else [item.name for item in self._rack.tasks]
 
     def _meant(self, plain: str, asked: str) -> Iterable[Reading]:
@@ -331,7 +331,7 @@ class Readings:
 
     def _matching(self, pattern: str, names: Iterable[str], absent: str) -> list[str]:
         known = list(names)
-        # fnmatch's own form: however many stars a stranger writes, it does not try again what cannot match.
+        # fnmatch's own form: it does not backtrack, however many stars a stranger writes.
         matches = re.compile(translate(pattern.replace("[", "[[]"))).match
         found = [name for name in known if matches(name)]
         if not found:
@@ -370,7 +370,7 @@ class Readings:
 
 
 def shown_value(variable: CommonVariable, value: Value) -> str:
-    """Return a value in its unit, by its scale where it has one; "" where it has neither."""
+    """Return a value in its unit, by its scale if it has one; "" if it has neither."""
     if variable.scale is not None and not isinstance(value, str):
         return f"{variable.scale.value_of(int(value)):.6g} {variable.unit}".rstrip()
     return f"{source_text(value)} {variable.unit}" if variable.unit else ""

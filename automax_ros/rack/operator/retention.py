@@ -1,16 +1,14 @@
-"""What a rack keeps over a power cycle, in a folder between two runs (2.4.5, J2-3106-1 p. 10-6).
+"""The state that a rack keeps over a power cycle, in a folder between two runs (2.4.5, J2-3106-1 p. 10-6).
 
-Kept are non-volatile commons, forces, what a module keeps in registers that are not the process's inputs, such as the
-test switches of a UDC, and of each task tunables, locals and the error log; with ``auto_run`` also which tasks ran.
-The folder holds one file, ``state.json``, replaced as a whole.
+Kept are non-volatile commons, forces, the registers of a module that are not the process's inputs, such as the test
+switches of a UDC, and of each task tunables, locals and the error log (2.4.5, J2-3106-1 p. 13-4); with ``auto_run``
+also which tasks ran. The folder holds one file, ``state.json``, replaced as a whole.
 
-To start from it is a power-up: what a module loses without power is lost. A task whose source was edited begins as
+A start from it is a power-up: what a module loses without power is lost. A task whose source was edited starts as
 installed, since to load it again is an installation (decision). With ``auto_run`` the tasks that ran are put into RUN;
-without it all are: whoever starts the emulator does what RUN ALL does (decision). Values of commons come back as writes
-at the start, after the presets, so that recordings have them (decision). Of a rack that is distributed each process
-keeps what its own modules and tasks have, and that of common memory the commons with their forces (decision).
-
-What a task keeps between two runs, as JSON has it: locals, tunables and error log (2.4.5, J2-3106-1 p. 13-4).
+without it all are, since starting the emulator acts as RUN ALL (decision). Values of commons come back as writes at the
+start, after the presets, so that recordings have them (decision). In a distributed rack each process keeps the state of
+its own modules and tasks, and the one with common memory the commons with their forces (decision).
 """
 
 from __future__ import annotations
@@ -40,7 +38,7 @@ _VARIABLES = (Role.LOCAL, Role.TUNABLE)
 
 
 def kept_task(task: Task, source: str) -> KeptTask:
-    """Return what a task keeps as it is now, between two scans."""
+    """Return the present state of a task that is to be kept, between two scans."""
     flat, at = task.snapshot(), 0
     values: dict[str, Value | list[Value]] = {}
     errors: list[Value] = []
@@ -55,7 +53,7 @@ def kept_task(task: Task, source: str) -> KeptTask:
 
 
 def restore_task(task: Task, kept: KeptTask) -> int:
-    """Give an installed task back what it has kept; return how many tunables are not as installed.
+    """Restore the kept state of an installed task; return how many tunables are not as installed.
 
     Raises:
         KeyError: something is missing.
@@ -104,7 +102,7 @@ MOST_BYTES = 64_000_000
 """Largest state file (decision: common memory and locals of four Processors are far below)."""
 _FILE = "state.json"
 Document = dict[str, Any]
-"""All that is kept, as JSON has it."""
+"""The whole kept state, as JSON has it."""
 
 
 class RetentionFault(UserError):
@@ -113,10 +111,10 @@ class RetentionFault(UserError):
 
 @dataclass(frozen=True)
 class Restored:
-    """What came back.
+    """Result of restoring a state.
 
     ``settings`` are for ``Rack.start``; ``commons``, ``tunables`` and ``forces`` are how many differ from an
-    installation; ``notes`` say what was kept and is not used any more.
+    installation; ``notes`` list kept values that are not used any more.
     """
 
     settings: tuple[tuple[str, Value], ...] = ()
@@ -127,7 +125,7 @@ class Restored:
 
 
 def default_folder(config: RackConfig) -> Path:
-    """Return where a rack on the wall clock keeps its state: next to the rack file."""
+    """Return the default state folder of a rack on the wall clock: next to the rack file."""
     return config.path.parent / ".automax" / config.name
 
 
@@ -135,7 +133,7 @@ class Retention:
     """Keeps one rack's state in a folder."""
 
     def __init__(self, rack: Rack, folder: Path) -> None:
-        """Take a rack that was not started; nothing is read or written yet."""
+        """Create for a rack that was not started; nothing is read or written yet."""
         self._rack = rack
         self.path = folder / _FILE
         volatile = (
@@ -146,9 +144,9 @@ class Retention:
         self._saved: Document = self._installed()
 
     def restore(self) -> Restored:
-        """Bring tasks and forces back, and return what the start must write; nothing where nothing was kept.
+        """Restore tasks and forces, and return the settings to be written at the start; nothing if no state was kept.
 
-        To be called before anybody observes the rack, so that what they are told first has it.
+        To be called before the rack is observed, so that the first data of observers has it.
 
         Raises:
             RetentionFault: the file cannot be read, is damaged, is another rack's, or does not fit this one.
@@ -165,7 +163,7 @@ class Retention:
             raise self._fault("AMX6711", f"is damaged: {_reason(error)}") from error
 
     def present(self) -> Document:
-        """Return all that is to be kept as it is now, between two scans."""
+        """Return the present state that is to be kept, between two scans."""
         rack, variables = self._rack, self._rack.config.variables
         commons: Document = {}
         for view in self._views:
@@ -184,9 +182,7 @@ class Retention:
         return document
 
     def save(self, document: Document | None = None) -> bool:
-        """Write a state, or the present one, down to the disk, if it is not the one that was written last.
-
-        Returns whether it was written.
+        """Write a state, or the present one, to the disk, if it differs from the one written last.
 
         Raises:
             RetentionFault: it cannot be written.
@@ -208,7 +204,7 @@ class Retention:
             yield element_name(variables[view], element), memory.read_now(view, element)
 
     def _installed(self) -> Document:
-        """Return the state at the start of a rack that has kept nothing: there is no need to write that."""
+        """Return the state at the start of a rack without a kept state: it need not be written."""
         document = self.present()
         for view in self._views:
             variable = self._rack.config.variables[view]
@@ -217,7 +213,7 @@ class Retention:
         return document
 
     def _statuses(self) -> dict[str, str]:
-        """Return how the tasks stand; while the power is off those that ran before it count as running."""
+        """Return the tasks' status; while the power is off those that ran before count as running."""
         rack = self._rack
         ran = frozenset() if rack.operations.powered else rack.operations.ran_at_power_off
         return {task.name: (Status.RUNNING if task.name in ran else task.status).name for task in rack.tasks}
@@ -241,7 +237,7 @@ class Retention:
         return Restored(tuple(settings), commons, tunables, forces, tuple(notes))
 
     def _settings(self, commons: Mapping[str, Document], notes: list[str]) -> Iterator[tuple[str, Value]]:
-        """Yield the elements that an installation would set otherwise."""
+        """Yield the elements whose kept values differ from an installation's."""
         variables = self._rack.config.variables
         defined = {variables[view].name: view for view in self._views}
         for name, kept in commons.items():
@@ -286,9 +282,9 @@ class Retention:
         return tunables
 
     def _force(self, forced: Mapping[str, Value], notes: list[str]) -> int:
-        """Force what was forced; what is not there any more is told, what cannot be forced is an error.
+        """Restore forces; a variable that no longer exists is noted, one that cannot be forced is an error.
 
-        A local that its edited task has no longer as a simple variable is told too (decision).
+        A local that its edited task has no longer as a simple variable is noted too (decision).
         """
         lines = {variable.name: variable.line for variable in self._rack.config.declared}
         lines |= {name: 0 for name in forced if self._may_hold(name)}
@@ -310,7 +306,7 @@ class Retention:
             return False
 
     def _begin_with(self, statuses: Mapping[str, str]) -> None:
-        """Let those tasks begin that ran, as AUTO RUN does; one that is new runs too."""
+        """Select the tasks that ran to be started, as AUTO RUN does; a new one starts too."""
         for task in self._rack.tasks:
             task.status = Status[statuses.get(task.name, "RUNNING")]
         running = [task for task in self._rack.tasks if task.status is Status.RUNNING]
@@ -337,7 +333,7 @@ def _kept_registers(rack: Rack) -> Iterator[tuple[int, int]]:
 
 
 def hash_of(text: str) -> str:
-    """Return what the text of a source is known by."""
+    """Return the hash that identifies the text of a source."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -1,1 +1,1 @@
-"""The plants of a running rack: their time, their signals in commons."""
+"""The plants of a running rack: their time, and their signals in commons."""

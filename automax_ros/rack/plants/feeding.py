@@ -1,7 +1,7 @@
-"""Brings signals of plants into commons, at whole multiples of each feed's time, before the scans of the instant.
+"""Writes signals of plants into commons, at whole multiples of each feed's time, before the scans of the instant.
 
-A value is written where it differs from what is there (decision: the write log has changes, not samples). Feeds go on
-while a rack is stopped, and rest without its power.
+A value is written only if it differs from the present one (decision: the write log has changes, not samples). Feeds
+continue while a rack is stopped, and pause while it has no power.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from automax_ros.runtime.memory.process_inputs import ProcessInputs
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 _AFTER_MODULES = 16
-"""Priority among the I/O of an instant: modules have those of their slots."""
+"""Priority among the I/O of an instant, after modules, whose priority is their slot."""
 
 
 class _Feed:
-    """A feed with the place in memory that it writes."""
+    """A feed, with the place in memory to which it writes."""
 
     __slots__ = ("_scale", "_signal", "element", "view", "writer")
 
@@ -35,13 +35,13 @@ class _Feed:
         self._scale, self._signal = config.scale, SIGNALS[config.signal]
 
     def value(self, plant: DrivePlant) -> Value:
-        """Return what the instrument shows now."""
+        """Return the instrument's present value."""
         found = self._signal(plant)
         return found if self._scale is None else self._scale.counts_of(found)[0]
 
 
 class _Round:
-    """The feeds of one plant that are written together."""
+    """Feeds of one plant that are written together."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class _Round:
         self._memory, self._operations, self._observers = inputs.memory, operations, observers
 
     def write(self, now_ns: int, _: int) -> None:
-        """Write what the instruments show now, where it differs from what is there."""
+        """Write the instruments' present values that differ from memory."""
         plant, memory = self._plant, self._memory
         plant.advance(now_ns)
         if not self._operations.powered:
@@ -80,7 +80,7 @@ class PlantFeeds:
         inputs: ProcessInputs,
         scheduler: Scheduler,
     ) -> None:
-        """Take what is fed by these plants; nothing is posted yet."""
+        """Create the feeds of these plants; nothing is scheduled yet."""
         self._plants, self._inputs, self._scheduler = plants, inputs, scheduler
         writers = {item.name: item.id for item in writers_of(config) if item.kind is WriterKind.PLANT}
         self._groups: dict[tuple[str, int], list[_Feed]] = {}
@@ -89,7 +89,7 @@ class PlantFeeds:
             self._groups.setdefault((item.plant, item.every_ns), []).append(feed)
 
     def begin(self, operations: Operations, observers: Observers) -> None:
-        """Begin, with this instant where it is one of theirs: at the rack's start, and at a state that was loaded."""
+        """Start, including this instant if it is one of theirs: at the rack's start, or after a state was loaded."""
         scheduler = self._scheduler
         for (name, every_ns), feeds in self._groups.items():
             key = EventKey(EventClass.IO, _AFTER_MODULES, f"{name} {every_ns:014}")

@@ -1,4 +1,4 @@
-"""The plants of a running rack: what becomes of them at power-up, in snapshots and when somebody works on them."""
+"""The plants of a running rack, and their state in snapshots."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from automax_ros.rackfile.model.plants import PlantConfig
 
 
 class RackPlants(Mapping[str, DrivePlant]):
-    """The plants with a motor, by name. They go on whatever becomes of the rack's power."""
+    """The plants with a motor, by name. They continue whether or not the rack has power."""
 
     def __init__(self, configs: Sequence[PlantConfig]) -> None:
-        """Make all plants, at rest, and couple them."""
+        """Create all plants, at rest, and couple them."""
         self._plants = build_plants(configs)
         self._parts: dict[str, DrivePlant | CoupledPlants] = {
             **self._plants,
@@ -33,11 +33,11 @@ class RackPlants(Mapping[str, DrivePlant]):
         return len(self._plants)
 
     def state(self) -> dict[str, SavedState]:
-        """Return all that their future depends on, by name; what is between two plants by the names of both."""
+        """Return the whole state, by plant; that of a coupling by the names of both plants."""
         return {name: part.state() for name, part in self._parts.items()}
 
     def load(self, state: Mapping[str, SavedState]) -> None:
-        """Take a state over.
+        """Restore a state.
 
         Raises:
             ValueError: it is not that of these plants.

@@ -1,8 +1,8 @@
-"""Looks at all plants of a rack at a fixed rate of rack time, for whoever wants to know: streams, reports.
+"""Samples all plants of a rack at a fixed rate of rack time, for streams and reports.
 
-They are looked at whether or not somebody wants to know: where a plant's time stops on its way decides the last bits of
-its numbers, and a run that is watched must be the same as one that is not (decision). For the same reason no look is
-left out where the host is late: late ones follow in order, as the interrupts of drives do (decision).
+They are sampled even if there is no observer: the instants at which a plant's time is advanced decide the last bits of
+its numbers, and a run that is watched must be the same as one that is not (decision). For the same reason no sample is
+left out if the host is late: late ones follow in order, as the interrupts of drives do (decision).
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ from automax_ros.drive.plant.plant import DrivePlant
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 SAMPLE_NS = 10_000_000
-"""Time between two looks, ns: 100 a second (decision)."""
+"""Time between two samples, ns: 100 per second (decision)."""
 _KEY = EventKey(EventClass.OBSERVE, 0, "")
 Look = Callable[[int], None]
-"""Is told the instant (ns) of a look: all plants are at that instant, and nothing else happens at it any more."""
+"""Called with the instant (ns) of a sample: all plants are at that instant, and nothing else happens at it any more."""
 
 
 class PlantSampling:
-    """The looks at the plants of one rack: at whole multiples of ``SAMPLE_NS``, after all else of the instant."""
+    """The samples of one rack's plants: at whole multiples of ``SAMPLE_NS``, after all else of the instant."""
 
     def __init__(self, plants: Mapping[str, DrivePlant], scheduler: Scheduler) -> None:
-        """Take the plants; nothing is posted yet."""
+        """Create the sampling of these plants; nothing is scheduled yet."""
         self._plants, self._scheduler = plants, scheduler
         self._looks: list[Look] = []
 
     def observe(self, look: Look) -> None:
-        """Call something at each look from now on."""
+        """Call ``look`` at each sample from now on."""
         self._looks.append(look)
 
     def begin(self) -> None:
-        """Begin, with this instant where it is one of the rate's; a rack without plants has no looks."""
+        """Start, including this instant if it is one of the rate's; a rack without plants has no samples."""
         if self._plants:
             first_ns = -(-self._scheduler.now_ns // SAMPLE_NS) * SAMPLE_NS
             self._scheduler.at(first_ns, _KEY, self._look)

@@ -1,1 +1,1 @@
-"""Tasks of a running rack: installed, triggered, counted."""
+"""Tasks of a running rack: installation, triggers, statistics."""

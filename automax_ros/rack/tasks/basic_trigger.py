@@ -1,4 +1,4 @@
-"""What makes a BASIC task go on: a time, an event, a channel."""
+"""Triggers the bursts of a BASIC task: by a time, an event or a channel."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from automax_ros.runtime.tasks.task import Status
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 
 LATE_NS = NS_PER_S
-"""A task that the host reaches later than this goes on at the present (decision: it does not make up for lost time)."""
+"""A task that the host reaches later than this continues now (decision: it does not make up for lost time)."""
 
 
 class WaitTrigger:
-    """A burst is due when what the task waits for is there: at that instant, in the task's place among all scans.
+    """A burst is due when the task's wait ends: at that instant, in the task's place among all scans.
 
     A hardware event that it waits on must come within its TIMEOUT, in ticks of the Processor, or ``expired`` is called
     (decision: as for scans).
@@ -27,7 +27,7 @@ class WaitTrigger:
     def __init__(
         self, task: BasicTask, events: Events, channels: Channels, scheduler: Scheduler, expired: Callable[[], None]
     ) -> None:
-        """Take the task; nothing is scheduled yet."""
+        """Create for a task; nothing is scheduled yet."""
         self._expired = expired
         self._timeout: Timeout | None = None
         self._task, self._events, self._channels, self._scheduler = task, events, channels, scheduler
@@ -36,7 +36,7 @@ class WaitTrigger:
         self._event: ScheduledEvent | None = None
 
     def arm(self, first_ns: int, due: Due) -> None:
-        """Let the first burst be due at ``first_ns``; a task that waits already goes on waiting."""
+        """Schedule the first burst at ``first_ns``; a task that waits already continues to wait."""
         self.disarm()
         self._due = due
         self._task.suspended = self._suspended
@@ -46,7 +46,7 @@ class WaitTrigger:
             self._wait()
 
     def disarm(self) -> None:
-        """Let no burst be due any more."""
+        """Schedule no more bursts."""
         self._due = None
         self._end_timeout()
         self._task.suspended = _nothing
@@ -59,14 +59,14 @@ class WaitTrigger:
 
     @property
     def next_ns(self) -> int | None:
-        """When the next burst is due; the present, while that is not known."""
+        """When the next burst is due; now, while that is not known."""
         if self._due is None:
             return None
         due_ns = self._scheduler.due_ns(self._event) if self._event is not None else None
         return self._scheduler.now_ns if due_ns is None else due_ns
 
     def _suspended(self) -> None:
-        """A burst has ended."""
+        """Wait for the next burst, when one has ended."""
         if self._task.status is Status.RUNNING and self._due is not None:
             self._wait()
 
@@ -84,7 +84,7 @@ class WaitTrigger:
             self._channels.wait(Suspension(kind), number, self._wake)
 
     def _wake(self, now_ns: int) -> None:
-        """Let the burst be due after whatever wakes the task: it does not begin inside another's scan."""
+        """Schedule the burst after the scan that wakes the task: it does not start inside another's scan."""
         self._end_timeout()
         self._task.make_ready()
         self._go_on_at(self._task.not_before(now_ns))
@@ -114,4 +114,4 @@ class WaitTrigger:
 
 
 def _nothing() -> None:
-    """Nobody waits for the end of a burst."""
+    """Do nothing: the end of a burst is not awaited."""

@@ -18,26 +18,26 @@ from automax_ros.rackfile.model.module import ModuleConfig, cost_model
 from automax_ros.rackfile.processes import processes_of
 
 Finding = tuple[SourceText, list[Diagnostic]]
-"""What is wrong in which text."""
+"""The diagnostics of a text."""
 
 
 class RackError(Exception):
     """A rack or a task cannot be built; ``findings`` are the diagnostics with the texts they refer to."""
 
     def __init__(self, message: str, findings: Sequence[Finding] = ()) -> None:
-        """Take a message and what is wrong in which text."""
+        """Create from a message and the diagnostics of texts."""
         super().__init__(message)
         self.findings = list(findings)
 
 
 @dataclass(frozen=True)
 class PreparedReload:
-    """Another source for a task, checked and compiled, that may be installed.
+    """Another source for a task, checked and compiled, ready for installation.
 
     Attributes:
         task: its name.
         source: the source.
-        compiled: what it was compiled to, None with a fault.
+        compiled: the compiled task, None with a fault.
         programs: those of all tasks once it is installed.
         among: those of all tasks that it was checked against.
         fault: why it cannot be installed.
@@ -54,7 +54,7 @@ class PreparedReload:
 class Installation:
     """All tasks of a rack, compiled.
 
-    ``warnings`` are what their checks found short of errors, ``native`` what became of each task that is compiled here.
+    ``warnings`` are those of their checks, ``native`` the outcome of native compilation for each task compiled here.
     """
 
     def __init__(
@@ -65,9 +65,9 @@ class Installation:
         sources: Mapping[str, SourceText] | None = None,
         native: NativeForms = IN_PYTHON,
     ) -> None:
-        """Check all tasks and compile them, or those of ``here`` alone; ``sources`` stand for the tasks' files.
+        """Check all tasks and compile them, or only those in ``here``; ``sources`` replace the tasks' files.
 
-        Scans in modeled time are executed in steps, which native scans have not: none is made for them then.
+        Scans in modeled time are executed in steps, which native scans do not have: none is made for them then.
 
         Raises:
             RackError: a task has errors; nothing is started then (the hardware's E0).
@@ -101,7 +101,7 @@ class Installation:
     def again(self, config: RackConfig) -> Installation:
         """Return the installation of another rack, which has the same tasks, modules and commons: nothing is compiled.
 
-        It must come from one that no rack has reloaded tasks of.
+        No rack may have reloaded tasks of this one.
         """
         other = copy(self)
         other._config = config
@@ -118,7 +118,7 @@ class Installation:
         return self._compiled[task]
 
     def prepare(self, task: str, source: SourceText) -> PreparedReload:
-        """Check and compile another source for a task of the rack; any thread may, for nothing is changed."""
+        """Check and compile another source for a task of the rack; safe on any thread, since nothing is changed."""
         among = self._programs
         try:
             program = self._checked(task, source, among)
@@ -132,7 +132,7 @@ class Installation:
         return prepared.among is self._programs
 
     def take(self, prepared: PreparedReload) -> CompiledTask:
-        """Let a prepared source be the task's program, and return it compiled.
+        """Make a prepared source the task's program, and return it compiled.
 
         Raises:
             RackError: the source has errors.
@@ -176,7 +176,7 @@ class Installation:
         modeled = self._config.execution is Timing.MODELED
         costs = cost_model(self._module(task)) if modeled else CostModel(Model.NONE)
         compiled = compile_program(program, self._views, costs)
-        if modeled:  # the form that is executed: else it would be compiled amid the task's first scan
+        if modeled:  # the form that is executed: else it would be compiled during the task's first scan
             _ = compiled.burst_steps if program.kind is TaskKind.BASIC else compiled.scan_steps
         return compiled
 
@@ -185,7 +185,7 @@ class Installation:
 
 
 def _kind(program: Program) -> str:
-    """Return what kind of task a program makes: a running rack cannot change it."""
+    """Return a program's kind of task: a running rack cannot change it."""
     if program.cml is not None:
         return f"a task of {program.cml.block.name}"
     return "a BASIC task" if program.kind is TaskKind.BASIC else "a control-block task"

@@ -1,4 +1,4 @@
-"""Makes the tasks of a rack that runs: what executes them, when their scans are due, who is told."""
+"""Installs the tasks of a running rack: their execution, their triggers, what follows each scan."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from automax_ros.runtime.time.scheduler import Scheduler
 class Installer:
     """Installs tasks in one rack.
 
-    ``after`` is told each scan, None where a task has faulted; ``no_event`` a task whose event did not come in time.
-    ``stopwatch`` (ns, monotonic) measures execution times; without one they count as 0.
+    ``after`` is called after each scan, with None if a task has faulted; ``no_event`` with a task whose event did not
+    come in time. ``stopwatch`` (ns, monotonic) measures execution times; without one they count as 0.
     """
 
     config: RackConfig
@@ -66,7 +66,7 @@ class Installer:
         trigger: MakeTrigger | None = None,
         then: Callable[[Task], None] | None = None,
     ) -> ScheduledTask:
-        """Return a task of the rack's file, installed (``rackfile/modules/kind.Install``)."""
+        """Return a task of the rack's file, installed (``rack/modules/module.Install``)."""
         installed = make_task(
             self.installation.compiled(task.name),
             memory or self.memory,
@@ -89,7 +89,7 @@ class Installer:
         )
 
     def _usual_trigger(self, task: Task) -> Trigger:
-        """Return the trigger of a task as it is installed; the interrupts that it waits for are connected."""
+        """Return the trigger of a task at its installation, and connect the interrupts it waits for."""
         self.interrupts.bind(task)
         if isinstance(task, CmlTask):
             return DriveTrigger(task)

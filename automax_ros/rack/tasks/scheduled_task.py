@@ -1,8 +1,6 @@
-"""A task of a running rack: what makes it scan, what executes it, and its statistics.
+"""A task of a running rack: its trigger, its execution, its statistics, and what follows each of its scans.
 
-What comes right after each scan of a rack: it is told, waiting inputs follow the process, a fault stops all.
-
-A file of its own since every scan goes through it: see ``tools/compiled_groups.py``.
+Every scan goes through this file, so it is compiled ahead of time: see ``tools/compiled_groups.py``.
 """
 
 from __future__ import annotations
@@ -22,20 +20,20 @@ from automax_ros.runtime.tasks.task import OVERLAP, ScanRecord, Status, Task
 from automax_ros.runtime.time.scheduler import Scheduler
 
 _FAULTED: Final = Status.FAULTED
-"""A name of its own, since it is asked for after each scan and an enumeration's member is slow to get."""
+"""A constant, since it is read after each scan and an enumeration's member is slow to get."""
 StopAll = Callable[[str, str | None, str], None]
-"""Stops the rack: is told the reason, the hardware's code where there is one, and the task."""
+"""Stops the rack: called with the reason, the hardware's code if there is one, and the task."""
 
 
 class ScanEnd:
-    """Ends the scans of one rack."""
+    """Ends scans of one rack: observers are notified, waiting inputs unfreeze, a fault stops all."""
 
     def __init__(self, observers: Observers, inputs: ProcessInputs, stop_all: StopAll) -> None:
-        """Take who is told, the inputs, and what stops the rack after a fault."""
+        """Create from the observers, the inputs, and the function that stops the rack after a fault."""
         self._observers, self._inputs, self._stop_all = observers, inputs, stop_all
 
     def ended(self, task: Task, record: ScanRecord | None) -> None:
-        """Do what comes after a scan, or after what stands before SCAN_LOOP."""
+        """Complete a scan, or the part before SCAN_LOOP."""
         if record is not None:
             self._observers.scanned(task, record)
         inputs = self._inputs
@@ -50,13 +48,13 @@ class ScanEnd:
 _LONGEST_NS = 2**32 - 1
 """Longest execution time that a message of a scan can hold."""
 _RUNNING = Status.RUNNING
-"""A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
+"""A constant, since it is read at each scan and an enumeration's member is slow to get."""
 After = Callable[[Task, ScanRecord | None], None]
-"""Is told of each scan, and of what stands before SCAN_LOOP, right after it."""
+"""Called right after each scan, and after the part before SCAN_LOOP."""
 
 
 class ScheduledTask:
-    """Puts a task into RUN and STOP, any number of times: between the two its trigger says when a scan is due."""
+    """Puts a task into RUN and STOP, any number of times: in between its trigger decides when a scan is due."""
 
     def __init__(
         self,
@@ -69,7 +67,7 @@ class ScheduledTask:
         after: After,
         stopwatch: Callable[[], int] | None = None,
     ) -> None:
-        """Take an installed task; nothing is scheduled yet."""
+        """Create from an installed task; nothing is scheduled yet."""
         self.task = task
         self.source = source
         self.statistics = TaskStatistics()
@@ -92,33 +90,33 @@ class ScheduledTask:
         return self.task.priority
 
     def start_up(self) -> None:
-        """Execute what stands before SCAN_LOOP, at the present; no scan is scheduled yet."""
+        """Execute the part before SCAN_LOOP now; no scan is scheduled yet."""
         self.stop()
         record = self.task.run(self._scheduler.now_ns)
         self._after(self.task, record)
 
     def scan_from(self, first_ns: int) -> None:
-        """Scan whenever it is due from ``first_ns`` on, if the task is in RUN."""
+        """Execute each scan that is due from ``first_ns`` on, if the task is in RUN."""
         self.trigger.disarm()
         if self.task.status is Status.RUNNING:
             self.trigger.arm(first_ns, self.due)
 
     def stop(self) -> None:
-        """Stop the task: no scan happens until it is put into RUN again; one under way is given up."""
+        """Stop the task: no scan is executed until it is put into RUN again; one in progress is abandoned."""
         self.trigger.disarm()
         self._execution.drop(self)
         self.task.heed_forces()
         self.task.stop()
 
     def install(self, compiled: CompiledTask, source: SourceText) -> None:
-        """Replace what the task executes; its state is as at installation, and it is stopped."""
+        """Replace the task's program; its state is as at installation, and it is stopped."""
         self.stop()
         self.task.install(compiled)
         self.trigger = self._make_trigger(self.task)
         self.source = source
 
     def state(self) -> dict[str, Any]:
-        """Return what the task keeps, when its next scan is due (ns), and how far one is that is under way."""
+        """Return the task's state, when its next scan is due (ns), and the progress of a scan under way."""
         task = self.task
         return {
             "source": task.compiled.program.source_hash,
@@ -134,7 +132,7 @@ class ScheduledTask:
         }
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take over a state; a task that ran goes on with the scan that was under way, or with its next one.
+        """Restore a state; a task that ran continues with the scan that was under way, or with its next one.
 
         Raises:
             ValueError: the state does not fit the task, or another source ran.
@@ -176,14 +174,14 @@ class ScheduledTask:
         self._after(task, record)
 
     def steps(self, now_ns: int, skipped: int) -> Steps:
-        """Return a scan in steps."""
+        """Return the steps of a scan."""
         self.statistics.skip(skipped)
         self._began_ns = now_ns
         self._late_ns = self._late(self._stopwatch(), now_ns) if self._stopwatch else 0
         return self.task.scan_modeled(now_ns, skipped)
 
     def done(self, record: ScanRecord | None) -> None:
-        """Tell of a scan whose last step was made; its time is the modeled one."""
+        """Complete a scan whose last step was executed; its time is the modeled one."""
         taken = 0 if self._began_ns is None else self._scheduler.now_ns - self._began_ns
         self._began_ns = None
         self.statistics.add(taken, self._late_ns)
@@ -192,13 +190,13 @@ class ScheduledTask:
         self._after(self.task, record)
 
     def fault(self, code: int) -> None:
-        """Fault the task for a scan that cannot be; one under way is given up."""
+        """Fault the task for a scan that is impossible; one in progress is abandoned."""
         self._execution.drop(self)
         self.task.heed_forces()
         self._after(self.task, self.task.fault(code, self._scheduler.now_ns))
 
     def _begin(self, now_ns: int, skipped: int) -> None:
-        """Let a scan be executed, unless the last one is still under way: that is an overlap (J2-3106-1 p. C-1)."""
+        """Start a scan, unless the last one is still in progress: that is an overlap (J2-3106-1 p. C-1)."""
         if self.task.status is not _RUNNING:
             return
         if self._execution.busy(self):
@@ -207,7 +205,7 @@ class ScheduledTask:
             self._execution.begin(self, now_ns, skipped)
 
     def _late(self, began_ns: int, now_ns: int) -> int:
-        """Return how much later than its instant the host has begun a scan, by the clock that keeps pace."""
+        """Return how much later than its instant the host started a scan, by the pacer's clock."""
         zero_ns = self._scheduler.zero_ns
         return 0 if zero_ns is None else max(0, began_ns - zero_ns - now_ns)
 

@@ -1,4 +1,4 @@
-"""How a task's scans go on this host: counts and times, of a window and since the rack was started."""
+"""Statistics of a task's scans on this host: counts and times, of a window and since the rack was started."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Times:
-    """Execution times of scans, ns, and how much later than their instants they have begun.
+    """Execution times and lateness of scans, ns.
 
-    Each scan counts once, stepped ones too, which are never late: time stands still until they happen.
+    Each scan counts once, stepped ones too, which are never late: rack time waits for them.
     """
 
     scans: int = 0
@@ -45,8 +45,8 @@ class Times:
 class TaskStatistics(Times):
     """Counts of one task since the rack was started; times in ns, of the host's where the rack has a stopwatch.
 
-    In modeled execution they are modeled times, from a scan's beginning to its end. ``window`` has those since it was
-    taken last.
+    In modeled execution they are modeled times, from a scan's start to its end. ``window`` counts since it was last
+    taken.
     """
 
     last_ns: int = 0
@@ -59,11 +59,11 @@ class TaskStatistics(Times):
         self.window.add(taken_ns, late_ns)
 
     def skip(self, scans: int) -> None:
-        """Count deadlines that were missed."""
+        """Count missed deadlines."""
         self.skipped += scans
         self.window.skipped += scans
 
     def take_window(self) -> Times:
-        """Return the times since the last call, and begin to count again."""
+        """Return the times since the last call, and restart their count."""
         taken, self.window = self.window, Times()
         return taken

@@ -1,4 +1,4 @@
-"""What makes a task scan: its Processor's clock, an event, a drive's 57C406, or the module it stands in."""
+"""Triggers a task's scans: by its Processor's clock, an event, a drive's 57C406, or the task's module."""
 
 from __future__ import annotations
 
@@ -12,52 +12,52 @@ from automax_ros.runtime.tasks.task import Task
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
 
 Due = PeriodicAction
-"""Is called when a scan is due, with the instant in ns and the number of instants skipped just before it."""
+"""Called when a scan is due, with the instant in ns and the number of instants skipped just before it."""
 
 
 LATE_NS = UDC_TICK_NS
-"""Lateness from which on a host may have skipped what interrupts."""
+"""A host that is this late may have skipped scans whose end interrupts."""
 _LAST = EventKey(EventClass.OBSERVE, 0, "")
 
 
 class Trigger(Protocol):
-    """Tells when scans of one task are due, from ``arm`` to ``disarm``."""
+    """Decides when scans of one task are due, from ``arm`` to ``disarm``."""
 
     def arm(self, first_ns: int, due: Due) -> None:
-        """Begin: no scan is due before ``first_ns``."""
+        """Start: no scan is due before ``first_ns``."""
         ...
 
     def disarm(self) -> None:
-        """End; a second time this does nothing."""
+        """End; a second call does nothing."""
         ...
 
     @property
     def next_ns(self) -> int | None:
-        """What ``arm`` must be given to go on as from now; None while it is not armed."""
+        """Argument with which ``arm`` continues from now; None while not armed."""
         ...
 
 
 MakeTrigger = Callable[[Task], Trigger]
-"""Makes the trigger of a task as it is installed."""
+"""Returns the trigger of a task at its installation."""
 
 
 class ClockTrigger:
     """A scan is due each TICKS x tick rate."""
 
     def __init__(self, task: Task, scheduler: Scheduler) -> None:
-        """Take the task; nothing is scheduled yet."""
+        """Create for a task; nothing is scheduled yet."""
         self._scheduler = scheduler
         self._period_ns = task.period_ns
         self._key = EventKey(EventClass.SCAN, task.priority, task.name)
         self._event: ScheduledEvent | None = None
 
     def arm(self, first_ns: int, due: Due) -> None:
-        """Let a scan be due at ``first_ns`` and each period after it."""
+        """Schedule a scan at ``first_ns`` and each period after it."""
         self.disarm()
         self._event = self._scheduler.every(self._period_ns, first_ns, self._key, due)
 
     def disarm(self) -> None:
-        """Let no scan be due any more."""
+        """Schedule no more scans."""
         if self._event is not None:
             self._event.cancel()
             self._event = None
@@ -69,25 +69,25 @@ class ClockTrigger:
 
 
 class Timeout:
-    """The time within which an event must be set again, once somebody waits for it.
+    """The time within which an event must be set again, while a task waits for it.
 
-    A host that is late makes the interrupts of a module late too, so no time runs out before all that is due has been
-    carried out. Where it was late by ``LATE_NS`` or more the time begins again: scans of a UDC were skipped, and the
+    A host that is late makes the interrupts of a module late too, so no timeout expires before all that is due was
+    executed. If the host was late by ``LATE_NS`` or more the timeout starts again: scans of a UDC were skipped, and the
     one whose end interrupts may still be under way in modeled execution (decision).
     """
 
     def __init__(self, timeout_ns: int, key: EventKey, scheduler: Scheduler, expired: Callable[[], None]) -> None:
-        """Take the time, and what is called when it is over; it does not run yet."""
+        """Create with the time and the function to call when it is over; it does not run yet."""
         self._timeout_ns, self._key, self._scheduler, self._expired = timeout_ns, key, scheduler, expired
         self._end: ScheduledEvent | None = None
 
     def begin(self, since_ns: int) -> None:
-        """Let the time run from an instant on, in place of any earlier one."""
+        """Start the time at ``since_ns``, in place of an earlier start."""
         self.end()
         self._end = self._scheduler.at(since_ns + self._timeout_ns, self._key, self._over)
 
     def end(self) -> None:
-        """Let it run no longer."""
+        """Stop the time."""
         if self._end is not None:
             self._end.cancel()
             self._end = None
@@ -111,7 +111,7 @@ class EventTrigger:
     """
 
     def __init__(self, event: Event, task: Task, scheduler: Scheduler, expired: Callable[[], None]) -> None:
-        """Take the event; nobody waits for it yet."""
+        """Create for an event; no task waits for it yet."""
         self._event, self._scheduler = event, scheduler
         self._key = EventKey(EventClass.SCAN, task.priority, task.name)
         self._due: Due | None = None
@@ -122,7 +122,7 @@ class EventTrigger:
         self._timeout = Timeout(ticks * program.tick_ns, self._key, scheduler, expired) if ticks else None
 
     def arm(self, first_ns: int, due: Due) -> None:
-        """Wait for the event from now on, and go on waiting while a scan that it started is under way."""
+        """Wait for the event from now on, and continue to wait during a scan that it started."""
         self.disarm()
         self._due = due
         self._event.pending = False
@@ -130,7 +130,7 @@ class EventTrigger:
         self._wait_since(first_ns)
 
     def disarm(self) -> None:
-        """Wait no longer."""
+        """Stop waiting."""
         self._due = None
         self._event.forget(self._wake)
         if self._timeout is not None:
@@ -141,7 +141,7 @@ class EventTrigger:
 
     @property
     def next_ns(self) -> int | None:
-        """Since when it waits."""
+        """When it started to wait."""
         return self._since_ns if self._due is not None else None
 
     def _wait_since(self, now_ns: int) -> None:
@@ -150,7 +150,7 @@ class EventTrigger:
             self._timeout.begin(now_ns)
 
     def _wake(self, now_ns: int) -> None:
-        """Let the scan be due after whatever sets the event: a scan does not begin inside another."""
+        """Schedule the scan after the scan that sets the event: it does not start inside another."""
         self._event.wait(self._wake)
         if self._due is not None:
             due, skipped = self._due, self._event.skipped
@@ -162,16 +162,16 @@ class DriveTrigger:
     """A scan is due at each interrupt of the task's 57C406, six in a cycle of its line (52.0)."""
 
     def __init__(self, task: CmlTask) -> None:
-        """Take the task; its 57C406 does not interrupt yet."""
+        """Create for a task; its 57C406 does not interrupt yet."""
         self._task = task
         self._key = EventKey(EventClass.SCAN, task.priority, task.name)
 
     def arm(self, first_ns: int, due: Due) -> None:
-        """Let the 57C406 interrupt from ``first_ns`` on."""
+        """Start the interrupts of the 57C406 at ``first_ns``."""
         self._task.port.arm(first_ns, self._key, due)
 
     def disarm(self) -> None:
-        """Let it interrupt no more: the drive's gates and contactor are off at once."""
+        """End the interrupts: the drive's gates and contactor are off at once."""
         self._task.port.disarm()
 
     @property
@@ -181,24 +181,24 @@ class DriveTrigger:
 
 
 class ModuleTrigger:
-    """The module itself says when a scan is due, as long as the trigger is ``armed``."""
+    """The module itself decides when a scan is due, while the trigger is ``armed``."""
 
     def __init__(self, scheduler: Scheduler) -> None:
-        """Begin unarmed."""
+        """Create unarmed."""
         self._scheduler = scheduler
         self.armed = False
 
     def arm(self, first_ns: int, due: Due) -> None:  # noqa: ARG002
-        """Let the module begin."""
+        """Include the task in the module's scans."""
         self.armed = True
 
     def disarm(self) -> None:
-        """Let the module pass the task over."""
+        """Exclude the task from the module's scans."""
         self.armed = False
 
     @property
     def next_ns(self) -> int | None:
-        """The present, while it is armed."""
+        """Now, while it is armed."""
         return self._scheduler.now_ns if self.armed else None
 
 

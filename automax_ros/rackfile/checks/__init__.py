@@ -1,1 +1,1 @@
-"""What must hold among tasks, modules and drives of a rack."""
+"""Rules among the tasks, modules and drives of a rack."""

@@ -1,9 +1,9 @@
-"""Looks at who writes and reads each common of a rack: two writers, none, nobody at all; a drive without its plant.
+"""Checks the writers and readers of each common of a rack: two writers, no writer, no use; and drives without a plant.
 
 All are warnings, and few of them false (decision). Writes before SCAN_LOOP, and those of a BASIC task that does its
-work once and ends, initialise: another task may write the common later. Elements of arrays count as separate unless
-both tasks name one by constants. Where each task writes nothing but constants to a BOOLEAN it is a handshake: one sets
-what the other resets. I/O points are wiring: who writes those that a task reads is not looked for.
+work once and ends, are initialisation: another task may write the common later. Elements of arrays count as separate
+unless both tasks name one by constants. If each task writes only constants to a BOOLEAN it is a handshake: one sets
+what the other resets. I/O points are wiring: writers of the points that a task reads are not searched for.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _NAMED = 6
 
 
 class _Write(NamedTuple):
-    """Where a scan writes a common, and whether what it writes is TRUE or FALSE as such."""
+    """A place where a scan writes a common, and whether it writes the constant TRUE or FALSE."""
 
     task: str
     target: Reference | Element
@@ -46,7 +46,7 @@ class _Write(NamedTuple):
 
 
 class _Read(NamedTuple):
-    """Where a task reads a common."""
+    """A place where a task reads a common."""
 
     task: str
     line: int | None
@@ -79,10 +79,10 @@ def writer_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict
 
 
 def rack_warnings(config: RackConfig, programs: Mapping[str, Program]) -> list[Diagnostic]:
-    """Return what looks forgotten in a rack file; ``programs`` are those of all its tasks.
+    """Return warnings about omissions in a rack file; ``programs`` are those of all its tasks.
 
-    AMX6496 a common that tasks read and nobody writes, AMX6497 commons that nobody uses, AMX6498 the 57C406 of a
-    current minor loop without a plant.
+    AMX6496: tasks read a common that is never written; AMX6497: commons that are never used; AMX6498: the 57C406 of a
+    current minor loop has no plant.
     """
     return [*_unwritten(config, programs), *_unused(config, programs), *_without_plant(config, programs)]
 
@@ -135,7 +135,7 @@ def _without_plant(config: RackConfig, programs: Mapping[str, Program]) -> Itera
 
 
 def _supplied(config: RackConfig) -> set[str]:
-    """Return the commons that something other than a task gives a value."""
+    """Return the commons that get a value from something other than a task."""
     given = {item.name for item in config.declared if item.direction is Direction.IN or item.preset is not None}
     return given | _connected(config)
 
@@ -146,7 +146,7 @@ def _connected(config: RackConfig) -> set[str]:
 
 
 def _place(config: RackConfig, line: int) -> Span:
-    """Return where the first word of a line of the rack file stands."""
+    """Return the place of the first word in a line of the rack file."""
     text = config.text.split("\n")[line - 1]
     start = len(text) - len(text.lstrip())
     return Span(line, start + 1, start + 1 + len(re.split(r"[\s:]", text[start:])[0]))
@@ -158,7 +158,7 @@ def _zero(variable: CommonVariable) -> str:
 
 
 def _same(first: list[_Write], second: list[_Write]) -> tuple[_Write, _Write] | None:
-    """Return a write of each of two tasks to one variable or element; None where there is none, or a handshake."""
+    """Return a write of each of two tasks to one variable or element; None if there is none, or for a handshake."""
     if all(item.is_constant for item in (*first, *second)):
         return None
     places = {element: write for write in reversed(first) if (element := _element(write)) is not None}
@@ -166,7 +166,7 @@ def _same(first: list[_Write], second: list[_Write]) -> tuple[_Write, _Write] | 
 
 
 def _element(write: _Write) -> tuple[int, ...] | None:
-    """Return the subscripts of what is written, () for a simple variable, None where they are not constants."""
+    """Return the subscripts of a write's target, () for a simple variable, None if they are not constants."""
     if isinstance(write.target, Reference):
         return ()  # A block's table is a whole array, and as such an input.
     numbers = [item.value for item in write.target.subscripts if isinstance(item, IntegerLiteral)]
@@ -174,7 +174,7 @@ def _element(write: _Write) -> tuple[int, ...] | None:
 
 
 def _writes(program: Program) -> Iterator[_Write]:
-    """Yield where the scans of a task write commons, what initialises left out."""
+    """Yield the writes of a task's scans to commons, without initialisation."""
     if program.is_basic and not _repeats(program):
         return
     for target, line, value in _targets(program, program.scan):
@@ -194,7 +194,7 @@ def _ever_written(program: Program) -> set[str]:
 def _targets(
     program: Program, statements: tuple[Statement, ...]
 ) -> Iterator[tuple[Reference | Element, int | None, Expression | None]]:
-    """Yield what statements and the blocks among them write, with the line, and the value of an assignment."""
+    """Yield the targets of statements and of the blocks among them, with the line, and the value of an assignment."""
     if program.cml is not None:
         yield from ((target, program.cml.line, None) for target in _outputs(program.cml))
     for statement, line in statements_in_order(statements):
@@ -223,7 +223,7 @@ def _reads(program: Program) -> Iterator[tuple[str, int | None]]:
 
 
 def _repeats(program: Program) -> bool:
-    """Return whether a BASIC task goes on for ever: it jumps back, or begins again by the clock."""
+    """Return whether a BASIC task repeats for ever: it jumps back, or starts again by the clock."""
     for statement, line in statements_in_order(program.scan):
         if isinstance(statement, StartEvery) or any(target <= (line or 0) for target in jumps_of(statement)):
             return True

@@ -1,4 +1,4 @@
-"""How much of each module's time its tasks take, by the manual's execution times (section 53)."""
+"""The load of each module by its tasks, from the manual's execution times (section 53)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _WHOLE, _HALF = 100.0, 50.0
 
 @dataclass(frozen=True)
 class TaskLoad:
-    """The time of a task's scans; ``period_ns`` is None for a task that has none, and then it has no share.
+    """The time of a task's scans; ``period_ns`` is None for a task without a period, which has no share.
 
     ``fires``: it has a current minor loop, and its period is a sixth of a line cycle.
     """
@@ -36,10 +36,10 @@ class TaskLoad:
     period_ns: int | None
     fires: bool = False
     accesses: Mapping[int, int] = field(default_factory=dict)
-    """How many registers of a 57C406 it latches in a scan, by slot: each delays the microprocessor there (52.7)."""
+    """Registers of a 57C406 that it latches in a scan, by slot: each delays the microprocessor there (52.7)."""
 
     def delay_percent(self, slot: int) -> float:
-        """Return the share of the time of the 57C406 in a slot that its accesses cost."""
+        """Return the share of the time of the 57C406 in a slot that is taken by its accesses."""
         return 0.0 if self.period_ns is None else _WHOLE * self.accesses[slot] * ACCESS_NS / self.period_ns
 
     @property
@@ -50,7 +50,7 @@ class TaskLoad:
 
 @dataclass(frozen=True)
 class ModuleLoad:
-    """The tasks of a module in the order of the file; ``word`` is what the manuals call it."""
+    """The tasks of a module in the order of the file; ``word`` is the module's name in the manuals."""
 
     module: ModuleConfig
     word: str
@@ -63,7 +63,7 @@ class ModuleLoad:
 
     @property
     def least_ticks(self) -> int | None:
-        """The fewest TICKS in which all tasks fit that share one scan (53.2), None where each has its own."""
+        """The fewest TICKS in which all tasks that share one scan fit (53.2); None if each task has its own scan."""
         if self.module.times not in MOST_SHARED_TICKS or not self.tasks:
             return None
         return -(-sum(task.times.most_ns for task in self.tasks) // self.module.tick_ns)
@@ -92,13 +92,13 @@ def _load_of(config: RackConfig, module: ModuleConfig, programs: Mapping[str, Pr
 
 
 def faults(config: RackConfig, loads: Iterable[ModuleLoad]) -> list[Diagnostic]:
-    """Return what is wrong with the loads of a rack, each at the place of its module in the rack file."""
+    """Return the diagnostics of a rack's loads, each at the place of its module in the rack file."""
     known = list(loads)
     return [*_old_executive(config), *(found for load in known for found in _overload(load)), *late_loops(known)]
 
 
 def late_loops(loads: Iterable[ModuleLoad]) -> Iterator[Diagnostic]:
-    """Tell of current minor loops whose command comes in the second half of a sixth of a line cycle."""
+    """Report current minor loops whose command comes in the second half of a sixth of a line cycle."""
     for load, task in ((module, task) for module in loads for task in module.tasks):
         if task.fires and task.percent is not None and task.percent > _HALF:
             took, sixth = task.times.most_ns / NS_PER_US, (task.period_ns or 0) / NS_PER_US

@@ -1,4 +1,4 @@
-"""What must hold among the current minor loop tasks of a rack, its Processors and its drive modules (J-3675 p. C-1)."""
+"""Rules among the current minor loop tasks of a rack, its Processors and its drive modules (J-3675 p. C-1)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from automax_ros.rackfile.modules.drive import DRIVE_CONTROLLER, DriveConfig
 from automax_ros.rackfile.modules.io import DRIVE_MODEL
 
 MAX_LOOPS = 2
-"""Current minor loop tasks of one rack (J-3675 p. C-1)."""
+"""Most current minor loop tasks of one rack (J-3675 p. C-1)."""
 LINES = 4
 """Interrupt lines of the backplane: one for the hardware events of a Processor, one for a loop (J-3675 p. C-1)."""
 CONTROLLER = next(iter(DRIVE_CONTROLLER.models))
@@ -26,7 +26,7 @@ _Found = tuple[str, Diagnostic]
 
 
 def drive_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
-    """Return what is wrong with the current minor loop tasks, and with others that touch their 57C406, by task."""
+    """Return the diagnostics of the current minor loop tasks, and of others that access their 57C406, by task."""
     found: dict[str, list[Diagnostic]] = {}
     loops = _Loops(config, programs)
     rules = (
@@ -41,14 +41,14 @@ def drive_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[
 
 @dataclass(frozen=True)
 class _Loop:
-    """A current minor loop task where it stands; ``bound`` is its CALL."""
+    """A current minor loop task with its module; ``bound`` is its CALL."""
 
     module: ModuleConfig
     task: TaskConfig
     bound: BoundCall
 
     def slot(self, keyword: str) -> int:
-        """Return a slot that it names."""
+        """Return the slot that an input names."""
         return int(self.bound.facts[keyword.lower()])
 
     def found(self, code: str, message: str, hint: str | None = None, keyword: str = "") -> _Found:
@@ -137,7 +137,7 @@ class _Loops:
                 yield loop.found("AMX6788", message, hint, "AC_LINE_FREQ")
 
     def priorities(self) -> Iterator[_Found]:
-        """Nothing goes before the loop on its Processor (52.4.1: it normally has the highest priority)."""
+        """No task has priority over the loop on its Processor (52.4.1: it normally has the highest priority)."""
         for loop in self.all:
             before = [task.name for task in loop.module.tasks if task.priority < loop.task.priority]
             if before:
@@ -149,7 +149,7 @@ class _Loops:
                 yield loop.found("AMX6492", message, hint)
 
     def registers(self) -> Iterator[_Found]:
-        """A control-block task latches all the commons that it declares, and so slows the 57C406 each scan (52.7)."""
+        """A control-block task latches all commons that it declares, and so delays the 57C406 in each scan (52.7)."""
         for name, program in self.programs.items():
             for symbol, point, line in latched_registers(self.config, program):
                 message = (
@@ -161,7 +161,7 @@ class _Loops:
 
 
 def latched_registers(config: RackConfig, program: Program) -> Iterator[tuple[Symbol, Point, int]]:
-    """Yield what a control-block task latches of the registers of any 57C406: its variable, point, line of the file."""
+    """Yield the registers of any 57C406 that a control-block task latches: variable, point, line of the rack file."""
     slots = {module.slot for module in config.modules if isinstance(module, DriveConfig)}
     points = {item.name: item for item in config.declared if item.point is not None and item.point.slot in slots}
     for symbol in () if program.is_basic else program.symbols.values():

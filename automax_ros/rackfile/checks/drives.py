@@ -1,6 +1,6 @@
 """The drives of a rack: a plant that a module drives, or a task with a current minor loop, or both.
 
-The drives of a rack as ``drive/assess/assessment`` judges them: what the rack file and its tasks say, put together.
+``drive_cases`` combines the rack file and its tasks into the drives that ``drive/assess/assessment`` judges.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ class RackDrive:
     """One drive of a rack.
 
     Attributes:
-        module: the module that drives it; None where the task names a slot without one.
+        module: the module that drives it; None if the task names an empty slot.
         slot: its slot.
-        letter: A or B where the module has two drives, otherwise "".
+        letter: A or B if the module has two drives, otherwise "".
         plant: its plant, None for a drive without one.
-        program: the task with its current minor loop, None where there is none.
+        program: the task with its current minor loop, None if there is none.
     """
 
     module: ModuleConfig | None
@@ -56,7 +56,7 @@ class RackDrive:
 
     @property
     def name(self) -> str:
-        """What it is called: its plant, or its loop's task."""
+        """The drive's name: that of its plant, or of its loop's task."""
         if self.plant is not None:
             return self.plant.name
         return self.program.name if self.program is not None else f"slot {self.slot}{self.letter}"
@@ -75,10 +75,10 @@ class RackDrive:
 
     @property
     def data(self) -> PlantData | None:
-        """What its plant is made of, None without a plant or a motor.
+        """The data of its plant, None without a plant or a motor.
 
         Raises:
-            ParameterError: it cannot be.
+            ParameterError: such a plant is impossible.
         """
         return plant_data(self.plant) if self.plant is not None else None
 
@@ -86,7 +86,7 @@ class RackDrive:
 def rack_drives(config: RackConfig, programs: Iterable[Program]) -> list[RackDrive]:
     """Return the drives of a rack in the order of slots, those of one module in the order of its drives.
 
-    ``programs`` are its tasks as far as they have no errors.
+    ``programs`` are the rack's tasks without errors.
     """
     loops = {slot: program for program in programs if (slot := _slot_of(program)) is not None}
     found: list[RackDrive] = []
@@ -109,12 +109,12 @@ def _slot_of(program: Program) -> int | None:
 def given_inputs(
     drive: RackDrive, config: RackConfig, programs: Iterable[Program], settings: Mapping[str, Value]
 ) -> dict[str, Given]:
-    """Return what is programmed for the inputs of a drive's current minor loop, by keyword, defaults included.
+    """Return the programmed inputs of a drive's current minor loop, by keyword, defaults included.
 
     Of a loop that is in no task only LIM_BAR is known, which is the drive's Motor Overload Ratio (36).
 
-    A variable counts as what ``--set`` gives it, as the one constant that tasks ever assign to it, as the present value
-    of a tunable, or as its preset, in this order; otherwise it is not known (decision).
+    A variable counts as its value from ``--set``, as the one constant that tasks ever assign to it, as the present
+    value of a tunable, or as its preset, in this order; otherwise it is not known (decision).
     """
     call = drive.call
     if call is None or drive.program is None:
@@ -161,7 +161,7 @@ def _present(
     assigned: Mapping[str, Value | None],
     settings: Mapping[str, Value],
 ) -> tuple[Value | None, str]:
-    """Return the value of a variable, None where it is not known, and where it comes from."""
+    """Return the value of a variable, None if it is not known, and its source."""
     if name in settings:
         return settings[name], "--set"
     if name in assigned:
@@ -176,7 +176,7 @@ def _present(
 
 
 def _assigned(own: Program, programs: Iterable[Program]) -> dict[str, Value | None]:
-    """Return the constants that tasks assign to commons and one task to its locals; None for what else is written."""
+    """Return the constants that tasks assign to commons and one task to its locals; None for any other value."""
     found: dict[str, Value | None] = {}
     for program in programs:
         for name, value in written_constants(program, Scope.COMMON).items():
@@ -187,7 +187,7 @@ def _assigned(own: Program, programs: Iterable[Program]) -> dict[str, Value | No
 def written_constants(program: Program, scope: Scope, start: int | None = None) -> dict[str, Value | None]:
     """Return the variables that a task writes, with the value of those that get one constant in one place.
 
-    ``start`` is what a variable held before, for functions such as BIT_SET% of the variable itself; None: not known.
+    ``start`` is a variable's value before, for functions such as BIT_SET% of the variable itself; None: not known.
     """
     constants = _constants(program, start)
     return {
@@ -197,7 +197,7 @@ def written_constants(program: Program, scope: Scope, start: int | None = None) 
 
 
 def _constants(program: Program, start: int | None) -> dict[str, list[Value | None]]:
-    """Return what the assignments of a task give each simple variable, None for what is not a constant."""
+    """Return the values that a task assigns to each simple variable, None for one that is not a constant."""
     found: dict[str, list[Value | None]] = {}
     for statement, _ in statements_in_order((*program.startup, *program.scan)):
         if isinstance(statement, Assignment):
@@ -207,7 +207,7 @@ def _constants(program: Program, start: int | None) -> dict[str, list[Value | No
 
 
 def _value(expression: Expression, name: str, start: int | None) -> Value | None:
-    """Return what an expression gives, None where that is not known; ``start`` is what the variable ``name`` held."""
+    """Return the value of an expression, None if it is not known; ``start`` was the value of the variable ``name``."""
     if isinstance(expression, Reference) and expression.name == name:
         return start
     if not isinstance(expression, FunctionCall) or expression.name not in BUILTINS:
@@ -226,13 +226,13 @@ def _value(expression: Expression, name: str, start: int | None) -> Value | None
 @runtime_checkable
 class _WiredToDrive(Protocol):
     drive: int | None
-    """The slot of the 57C406 whose armature voltage it gets."""
+    """The slot of the 57C406 whose armature voltage it shows."""
 
 
 def drive_cases(
     config: RackConfig, programs: Sequence[Program], settings: Mapping[str, Value]
 ) -> list[DriveCase | Unjudged]:
-    """Return the drives of a rack, in the order of slots; ``settings`` are what ``--set`` gives commons."""
+    """Return the drives of a rack, in the order of slots; ``settings`` are the commons' values from ``--set``."""
     return [_case(drive, config, programs, settings) for drive in rack_drives(config, programs)]
 
 
@@ -284,9 +284,9 @@ def _is_wired(module: object, slot: int) -> bool:
 
 @dataclass(frozen=True)
 class _Registers:
-    """What the registers of a 57C406 hold once the tasks have initialised them, as far as it can be known.
+    """Values of the registers of a 57C406 after the tasks have initialised them, if they can be known.
 
-    The loop's task gives them their defaults: presets and ``--set`` do not count, what tasks write later does (52.4.1).
+    The loop's task gives them their defaults: presets and ``--set`` do not count, later writes of tasks do (52.4.1).
     """
 
     config: RackConfig
@@ -307,7 +307,7 @@ class _Registers:
         return [*self._points(register, None), *numbered]
 
     def _points(self, register: int, bit: int | None) -> list[int | None]:
-        """Return what tasks write to the points of a register, or of one of its bits."""
+        """Return the values that tasks write to the points of a register, or of one of its bits."""
         place = Point(self.slot, register, bit)
         names = {variable.name for variable in self.config.declared if variable.point == place}
         written = (

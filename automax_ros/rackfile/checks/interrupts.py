@@ -1,8 +1,8 @@
-"""Checks the hardware events of a rack's tasks against its modules: whose interrupts they are, how many, how often.
+"""Checks the hardware events of a rack's tasks against its modules: their interrupts, their number, their periods.
 
 The backplane has four interrupt lines (J-3675 p. C-1). A Processor with hardware events takes one, which serves four of
 them; so a rack of at most four Processors has one for each, as long as no current minor loop needs one
-(``modules/drive_rules``).
+(``rackfile/checks/drive_rules``).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from automax_ros.rackfile.model.config import CommonVariable, RackConfig
 from automax_ros.rackfile.model.module import Interrupt, ModuleConfig
 
 MAX_EVENTS = 4
-"""Hardware events of one Processor: what its interrupt line serves (J-3675 p. C-1)."""
+"""Most hardware events of one Processor: those that its interrupt line serves (J-3675 p. C-1)."""
 
 _Place = tuple[int, int]
 """Slot and register."""
@@ -33,7 +33,7 @@ class _Declared(NamedTuple):
 
 
 def interrupt_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
-    """Return what is wrong with the hardware events of tasks, by task; ``programs`` are those without errors."""
+    """Return the diagnostics of tasks' hardware events, by task; ``programs`` are those without errors."""
     found: dict[str, list[Diagnostic]] = {name: [] for name in programs}
     variables = {variable.name: variable for variable in config.declared}
     modules = {module.slot: module for module in config.modules}
@@ -64,7 +64,7 @@ def _hardware(program: Program) -> list[Event]:
 def _wrong_status(
     event: Event, variable: CommonVariable, modules: Mapping[int, ModuleConfig], rack_file: str
 ) -> Diagnostic | None:
-    """Return what is wrong with the variable that INTERRUPT_STATUS names."""
+    """Return a diagnostic of the variable that INTERRUPT_STATUS names, None if it is right."""
     assert event.interrupt_status is not None
     name, span = variable.name, event.interrupt_status.span
     place = f"({rack_file}:{variable.line})"
@@ -96,7 +96,7 @@ def _two_sources(declared: Iterable[_Declared]) -> Iterator[tuple[str, Diagnosti
 
 
 def _too_many(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[tuple[str, Diagnostic]]:
-    """Yield the events that a Processor's interrupt line does not serve any more."""
+    """Yield the events beyond those that a Processor's interrupt line serves."""
     for module in config.task_modules:
         present = [task.name for task in module.tasks if task.name in programs]
         events = [(name, item) for name in present for item in _hardware(programs[name])]
@@ -108,7 +108,7 @@ def _too_many(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[t
 def _periods(
     config: RackConfig, programs: Mapping[str, Program], declared: Iterable[_Declared]
 ) -> Iterator[tuple[str, Diagnostic]]:
-    """Yield the events whose module, as far as the tasks show, never has the period of the scan that it starts."""
+    """Yield events whose module, as far as the tasks show, never has the period of the scan that they start."""
     interrupts = {(module.slot, item.status): item for module in config.modules for item in module.registers.interrupts}
     writes = constant_writes(config, programs.values())
     for task, event, place in declared:
@@ -125,7 +125,7 @@ def _periods(
 
 
 def _possible(config: RackConfig, interrupt: Interrupt, slot: int, written: list[int | None]) -> set[int]:
-    """Return the periods in ns that the tasks give a module, () where that cannot be known."""
+    """Return the periods in ns that the tasks set in a module, empty if they cannot be known."""
     values = list(written)
     for variable in config.declared:
         point = variable.point

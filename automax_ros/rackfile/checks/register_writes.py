@@ -1,4 +1,4 @@
-"""What the tasks of a rack write to the registers of its modules, as far as their text shows it."""
+"""Constants that the tasks of a rack write to the registers of its modules, from the tasks' text."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from automax_ros.rackfile.model.config import RackConfig
 Register = tuple[int, int]
 """Slot and register."""
 Constants = Mapping[Register, list[int | None]]
-"""What is written to each register: a number, or None where it cannot be known."""
+"""The values written to each register: a number, or None if it is not known."""
 
 
 def constant_writes(config: RackConfig, programs: Iterable[Program]) -> Constants:
-    """Return what all statements write to registers; a block that has one among its parameters may write anything."""
+    """Return the writes of all statements to registers; a block with a register as a parameter may write anything."""
     places = {
         variable.name: (variable.point.slot, variable.point.register)
         for variable in config.declared
@@ -41,7 +41,7 @@ def constant_writes(config: RackConfig, programs: Iterable[Program]) -> Constant
 
 
 def numbered_writes(programs: Iterable[Program]) -> Constants:
-    """Return what IOWRITE statements alone write to registers, as far as they name them by constants."""
+    """Return the writes of IOWRITE statements alone to registers that they name by constants."""
     found: dict[Register, list[int | None]] = defaultdict(list)
     for program in programs:
         for statement, _ in statements_in_order((*program.startup, *program.scan)):

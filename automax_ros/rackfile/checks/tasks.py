@@ -1,7 +1,4 @@
-"""What must hold among the tasks of a rack and its modules, beyond what each task's own check finds.
-
-Checks every task of a rack against the rack: its commons, and the tick of the Processor that runs it.
-"""
+"""Checks every task of a rack against the rack: its commons, its Processor's tick, rules among tasks and modules."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ from automax_ros.rackfile.sections.feeds import feed_findings
 
 
 class CheckedTask(NamedTuple):
-    """One task of a rack with what its check found; ``source`` is what the diagnostics refer to."""
+    """One task of a rack with the result of its check; diagnostics refer to ``source``."""
 
     task: TaskConfig
     source: SourceText
@@ -52,8 +49,8 @@ def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
 def check_tasks(config: RackConfig, sources: Mapping[str, SourceText] | None = None) -> list[CheckedTask]:
     """Check all tasks of a rack, modules in the order of slots, tasks in the order of the file.
 
-    ``sources`` by the tasks' names stand for their files, which are not touched then. A source that could be read when
-    the rack file was loaded but cannot be any more is an error of its task (AMX6306).
+    ``sources`` by the tasks' names replace their files, which are then not read. If a source could be read when the
+    rack file was loaded and cannot be read now, that is an error of its task (AMX6306).
     """
     commons = commons_of(config)
     checked = [_checked(module, task, commons, config, sources) for module, task in config.placed_tasks]
@@ -63,7 +60,7 @@ def check_tasks(config: RackConfig, sources: Mapping[str, SourceText] | None = N
 
 
 def forgotten(config: RackConfig, checked: Sequence[CheckedTask]) -> list[Diagnostic]:
-    """Return what looks forgotten in the rack file, none as long as a task has errors and so may hide a use."""
+    """Return warnings about omissions in the rack file; none while a task has errors, which may hide a use."""
     programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
     return rack_warnings(config, programs) if len(programs) == len(checked) else []
 
@@ -97,7 +94,7 @@ def check_source(
 
 
 def with_findings(result: CheckResult, findings: Sequence[Diagnostic]) -> CheckResult:
-    """Return a check's result with what the rack has against the task: no program where that is an error."""
+    """Return a check's result with the rack's findings about the task: no program if these are errors."""
     if not findings:
         return result
     diagnostics = in_order([*result.diagnostics, *findings])
@@ -105,14 +102,14 @@ def with_findings(result: CheckResult, findings: Sequence[Diagnostic]) -> CheckR
 
 
 Rule = Callable[[RackConfig, Mapping[str, Program]], Mapping[str, Sequence[Diagnostic]]]
-"""Returns what is wrong by the task in whose source it stands; it is given the programs without errors."""
+"""Returns diagnostics by the task in whose source they are; called with the programs without errors."""
 
 RULES: tuple[Rule, ...] = (interrupt_findings, udc_findings, drive_findings, feed_findings, writer_findings)
-"""All such rules."""
+"""All rules among tasks and modules."""
 
 
 def findings_by_task(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
-    """Return what the rules find, by task."""
+    """Return the findings of all rules, by task."""
     found: dict[str, list[Diagnostic]] = {}
     for rule in RULES:
         for name, diagnostics in rule(config, programs).items():

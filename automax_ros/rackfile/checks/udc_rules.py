@@ -1,4 +1,4 @@
-"""What must hold among the tasks of a UDC, the rack's other tasks and the UDC's drives (2.3, 36, S-3056 p. 3-50)."""
+"""Rules among the tasks of a UDC, the rack's other tasks and the UDC's drives (2.3, 36, S-3056 p. 3-50)."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from automax_ros.rackfile.modules.udc import (
 )
 
 _USUAL = {"motor_overload_ratio": USUAL_RATIO}
-"""Parameters that the PMI of a drive has where the rack file has none."""
+"""Parameters of a drive's PMI if the rack file has none."""
 _Found = tuple[str, Diagnostic]
 
 
 def udc_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
-    """Return what is wrong with the tasks of each UDC, and with others that share its registers, by task."""
+    """Return the diagnostics of the tasks of each UDC, and of others that share its registers, by task."""
     found: dict[str, list[Diagnostic]] = {}
     for module in config.modules:
         if isinstance(module, UdcConfig):
@@ -44,7 +44,7 @@ def udc_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[st
 
 @dataclass(frozen=True)
 class _Written:
-    """A common with a place on the UDC that a task can write: where it does so first."""
+    """A common on the UDC that a task writes, and the first place where it does."""
 
     task: str
     variable: CommonVariable
@@ -66,13 +66,13 @@ class _Udc:
 
     @cached_property
     def points(self) -> dict[str, CommonVariable]:
-        """The commons that stand in its dual port."""
+        """The commons in its dual port."""
         slot = self.module.slot
         return {item.name: item for item in self.config.declared if item.point is not None and item.point.slot == slot}
 
     @cached_property
     def written(self) -> list[_Written]:
-        """What the UDC's own tasks write of them."""
+        """The writes of the UDC's own tasks to them."""
         return [item for program in self.own for item in self._written_by(program)]
 
     def foreign_commons(self) -> Iterator[_Found]:
@@ -102,7 +102,7 @@ class _Udc:
             yield second.name, Diagnostic("AMX6482", message, call.call.span, call.line, hint)
 
     def boolean_pairs(self) -> Iterator[_Found]:
-        """With a boolean that the UDC writes, all of an even pair of application registers are its outputs."""
+        """If the UDC writes a boolean, all of an even pair of application registers are its outputs."""
         outputs = {item.variable.name for item in self.written}
         told: set[int] = set()
         for item in self.written:
@@ -144,7 +144,7 @@ class _Udc:
                     yield program.name, Diagnostic("AMX6484", message, span, line, hint)
 
     def drive_parameters(self) -> Iterator[_Found]:
-        """A constant that must be the same as a parameter of the drive is the same (36)."""
+        """A constant that must equal a parameter of the drive does (36)."""
         for task in self.module.tasks:
             plant, program = self.module.plants.get(task.drive), self.programs.get(task.name)
             if plant is None or program is None:
@@ -162,7 +162,7 @@ class _Udc:
                         yield task.name, Diagnostic("AMX6485", message, bound.call.span, bound.line, notes=notes)
 
     def interrupts(self) -> Iterator[_Found]:
-        """A task that scans on the UDC's interrupt counts with a period that N scans of the UDC can have."""
+        """A task that scans on the UDC's interrupt uses a period that N scans of the UDC can have."""
         periods = self._periods_ns()
         for program in self.programs.values():
             event = next((item for item in program.events if item.name == program.event), None)
@@ -177,7 +177,7 @@ class _Udc:
                 yield program.name, Diagnostic("AMX6445", message, event.span, event.number, hint)
 
     def _periods_ns(self) -> set[int]:
-        """Return the periods of the interrupt as far as the tasks show, none where that cannot be known."""
+        """Return the periods of the interrupt as far as the tasks show, empty if they cannot be known."""
         place = (self.module.slot, SCANS_PER_INTERRUPT)
         values = list(constant_writes(self.config, self.programs.values()).get(place, []))
         for variable in self.points.values():
@@ -199,7 +199,7 @@ def _scan_loop(program: Program) -> BoundCall:
 
 
 def _drive_constants(bound: BoundCall) -> Iterator[tuple[str, str, object]]:
-    """Yield the constants of a CALL that the drive fixes: keyword, the drive's parameter, value."""
+    """Yield the constants of a CALL that the drive determines: keyword, the drive's parameter, value."""
     for item in bound.block.inputs:
         if not item.drive_parameter:
             continue

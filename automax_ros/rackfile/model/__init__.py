@@ -1,1 +1,1 @@
-"""What a rack file means, as frozen dataclasses."""
+"""The configuration in a rack file, as frozen dataclasses."""

@@ -1,4 +1,4 @@
-"""What a rack's YAML file means: checked, frozen, without a trace of YAML.
+"""The configuration of a rack: checked, frozen, without a trace of YAML.
 
 ``line`` is the line of the file (from 1) where a thing is defined, for messages that show both places.
 """
@@ -23,18 +23,18 @@ from automax_ros.rackfile.reading.scale import Scale
 MAX_SLOT = 15
 """Highest slot of the largest rack (J2-3106-1 p. 10-2)."""
 DEFAULT_OUT_LIMIT = 200
-"""How many simple commons, from the top of the file, are published without `ros` (decision)."""
+"""Most simple commons, from the top of the file, that are published without `ros` (decision)."""
 
 
 class Timing(enum.Enum):
-    """How long scans take: no time at all, or the manual's time for their Processor (53)."""
+    """Duration of scans: no time at all, or the manual's time for their Processor (53)."""
 
     IDEAL = "ideal"
     MODELED = "modeled"
 
 
 class ModuleLoss(enum.Enum):
-    """What a rack of several processes does when it loses one: stop all tasks, or go on with the values it has."""
+    """Reaction of a distributed rack to the loss of a process: stop all tasks, or continue with the present values."""
 
     STOP_ALL = "stop_all"
     HOLD = "hold"
@@ -42,7 +42,7 @@ class ModuleLoss(enum.Enum):
 
 @dataclass(frozen=True)
 class Point:
-    """Where an I/O point stands: slot, (first) register, and its bit (0 to 15) where it is a BOOLEAN."""
+    """Place of an I/O point: slot, (first) register, and the bit (0 to 15) of a BOOLEAN."""
 
     slot: int
     register: int
@@ -53,12 +53,12 @@ class Point:
 class CommonVariable:
     """One variable of common memory.
 
-    ``name`` carries its type character. ``dimensions`` are numbers of elements (largest subscript + 1), () for a simple
-    variable. ``length`` is the longest text of a STRING, 0 for other types. ``preset`` is one value, for an array with
-    different values one for each element in the order of memory (last subscript fastest), None where the file has none.
-    ``point`` is its place on a module, None for common memory itself. A variable with ``bank`` is all the registers of
-    the module in that slot; its name, ``SLOT:5%``, is one that no task can declare.
-    ``scale`` is what its counts mean on ROS 2, None where the topic has the variable's own type.
+    ``name`` includes its type character. ``dimensions`` are numbers of elements (largest subscript + 1), () for a
+    simple variable. ``length`` is the longest text of a STRING, 0 for other types. ``preset`` is one value, for an
+    array with different values one for each element in the order of memory (last subscript fastest), None if the file
+    has none. ``point`` is its place on a module, None for common memory itself. A variable with ``bank`` is all the
+    registers of the module in that slot; its name, ``SLOT:5%``, is one that no task can declare. ``scale`` converts its
+    counts for ROS 2; without one (None) the topic has the variable's own type.
     """
 
     name: str
@@ -83,7 +83,7 @@ class CommonVariable:
 
     @property
     def elements(self) -> int:
-        """Number of values the variable holds."""
+        """Number of its values."""
         count = 1
         for size in self.dimensions:
             count *= size
@@ -100,7 +100,7 @@ class CommonVariable:
 
     @property
     def presets(self) -> tuple[Value, ...]:
-        """The preset of every element, () where there is none."""
+        """The preset of every element, () if there is none."""
         if self.preset is None:
             return ()
         return self.preset if isinstance(self.preset, tuple) else (self.preset,) * self.elements
@@ -114,12 +114,12 @@ CommonElement = Element[CommonVariable]
 class RackConfig:
     """A rack without errors.
 
-    ``namespace`` is its ROS namespace without the slash, ``path`` the YAML file and ``text`` what it says. Modules
-    stand in the order of slots, variables in the order of the file; after them the registers of the modules that have
+    ``namespace`` is its ROS namespace without the slash, ``path`` the YAML file and ``text`` its content. Modules are
+    in the order of slots, variables in the order of the file; after them come the registers of the modules that have
     some, each as one variable with a ``bank``. ``executive`` is the version of the Programming Executive in tenths (42
-    is 4.2), ``auto_run`` whether the tasks that ran are put into RUN after a power cycle. ``plants`` stand in the order
-    of the file, ``feeds`` and ``joint_commands`` in that of their plants. ``watch`` are the commons that are worth
-    looking at, None where the file does not say.
+    is 4.2), ``auto_run`` whether the tasks that ran are put into RUN after a power cycle. ``plants`` are in the order
+    of the file, ``feeds`` and ``joint_commands`` in that of their plants. ``watch`` are the commons to show, None if
+    the file has no such key.
     """
 
     name: str
@@ -177,7 +177,7 @@ class RackConfig:
 
 
 def bank_variables(modules: Iterable[ModuleConfig]) -> list[CommonVariable]:
-    """Return a variable for the registers of each module that has some; ROS never sees it."""
+    """Return a variable for the registers of each module that has some; it is not visible on ROS."""
     return [
         CommonVariable(
             f"SLOT:{module.slot}%",

@@ -1,4 +1,4 @@
-"""Which drive turns which plant."""
+"""The plants that the drives of a rack turn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A module as a rack file configures it: its registers, interrupts and tasks, whatever its kind."""
+"""A module of any kind in a rack file: its registers, interrupts and tasks."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from automax_ros.rackfile.model.task import TaskConfig
 
 @dataclass(frozen=True)
 class Interrupt:
-    """An interrupt that a module raises while the rack has a common clock.
+    """An interrupt that a module raises while the common clock of the rack runs.
 
     ``status`` is its interrupt status and control register (ISCR), which an EVENT names. ``period`` is the register
-    with the time between two, less one, in 0.5 ms; None where the module counts in a way of its own. ``inputs`` are
-    the registers that freeze at the interrupt. ``enable`` is a bit of ``status`` that must be set too, None where the
-    EVENT is enough.
+    with the time between two, less one, in 0.5 ms; None if the module counts in its own way. ``inputs`` are the
+    registers that freeze at the interrupt. ``enable`` is a bit of ``status`` that must be set too, None if the EVENT is
+    enough.
     """
 
     status: int
@@ -28,16 +28,15 @@ class Interrupt:
 
 @dataclass(frozen=True)
 class Registers:
-    """The registers of a module: how many, and who writes them.
+    """The registers of a module: their number, and their writers.
 
-    Tasks write ``outputs``. Of ``either`` a variable with ``ros: in`` is an input, any other what its task makes of it.
-    The rest are inputs, but for the ``reserved``: they are the module's own, and no point may stand there. ``reals``
-    are those on which REAL variables may stand. ``copies`` are pairs of a register and the input that shows the same;
-    ``clock_status`` pairs of an input and the bits that are set while there is a common
-    clock; ``counters`` are the first of two registers that count 24 bits. ``by_itself``: the module writes registers
-    without an interrupt too. ``shown`` are inputs that the module alone writes: neither ROS 2 nor a feed may.
-    ``commands`` are outputs that tasks alone write.
-    A module with drops has ``area`` registers for each, 0 being none, and points may stand on those of ``areas``.
+    Tasks write ``outputs``. In ``either`` a variable with ``ros: in`` is an input, any other is decided by its task.
+    The rest are inputs, except the ``reserved``: they are the module's own, and no point may be on them. REAL variables
+    may be on ``reals``. ``copies`` are pairs of a register and the input that shows the same; ``clock_status`` pairs of
+    an input and the bits that are set while the common clock runs; ``counters`` are the first of two registers that
+    count 24 bits. ``by_itself``: the module writes registers without an interrupt too. ``shown`` are inputs that only
+    the module writes: neither ROS 2 nor a feed may. ``commands`` are outputs that only tasks write. A module with drops
+    has ``area`` registers for each, 0 meaning no drops, and points may be on those of ``areas``.
     """
 
     count: int = 0
@@ -57,7 +56,7 @@ class Registers:
 
     @property
     def writes(self) -> bool:
-        """Whether the module writes registers, and so is a writer of its own."""
+        """Whether the module writes registers, and so is a writer in the write log."""
         return self.by_itself or bool(self.interrupts)
 
     @property
@@ -68,13 +67,13 @@ class Registers:
         return frozenset({*self.outputs, *self.either}) if self.outputs else self.either
 
     def direction(self, register: int) -> str:
-        """Return in a word what a register is: ``input``, ``output`` or ``either``."""
+        """Return the direction of a register: ``input``, ``output`` or ``either``."""
         if register in self.either:
             return "either"
         return "output" if register in self.outputs else "input"
 
     def place(self, register: int) -> str:
-        """Return how messages name a register: by its number, or by its drop and its number there."""
+        """Return a register's name in messages: its number, or its drop and its number there."""
         if not self.area:
             return f"register {register}"
         return f"drop {register // self.area} register {register % self.area}"
@@ -86,7 +85,7 @@ NO_REGISTERS = Registers()
 class ModuleConfig(Protocol):
     """A module as a rack file configures it. Its kind (``rack/modules``) has the rest.
 
-    ``name`` is unique in the rack and that of its node; ``tick_ns`` is that of its tasks, 0 where it can have none;
+    ``name`` is unique in the rack and that of its node; ``tick_ns`` is that of its tasks, 0 if it can have none;
     ``common_registers`` is how many 16-bit registers of common variables it can hold, 0 for none.
     """
 
@@ -124,10 +123,10 @@ class ModuleConfig(Protocol):
 
     @property
     def times(self) -> Model:
-        """Whose execution times its tasks have, Model.NONE for a module without tasks."""
+        """The model whose execution times its tasks have, Model.NONE for a module without tasks."""
         ...
 
 
 def cost_model(module: ModuleConfig) -> CostModel:
-    """Return what times the tasks of a module have; a UDC with one task has others than one with two (table 5)."""
+    """Return the execution times of a module's tasks; those of a UDC differ with one task and with two (table 5)."""
     return CostModel(module.times, alone=len(module.tasks) == 1)

@@ -33,7 +33,7 @@ def couple_plants(plants: Mapping[str, DrivePlant], configs: Iterable[PlantConfi
 
 
 def plant_data(config: PlantConfig) -> PlantData | None:
-    """Return what a plant is made of in SI units, None for one without a motor.
+    """Return the data of a plant in SI units, None for one without a motor.
 
     Raises:
         ParameterError: the plate contradicts itself, or a value is beyond what can be simulated.

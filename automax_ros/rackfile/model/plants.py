@@ -1,4 +1,4 @@
-"""What the ``plants`` section of a rack file means; engineering units as in the file.
+"""The ``plants`` section of a rack file, in the engineering units of the file.
 
 ``line`` is the line of the file where a plant is defined, ``supply`` its AC line.
 """
@@ -21,7 +21,7 @@ MOTORS = {"dc_10hp_240v": "10hp", "dc_150hp_500v": "150hp", "dc_800hp_700v": "80
 
 
 def plant_name(text: str) -> Schema:
-    """Return the schema of a value that names a plant; ``text`` says for what."""
+    """Return the schema of a value that names a plant, described by ``text``."""
     return named(text, f"^{PLANT_NAME.replace('A-Z', 'A-Za-z')}$")
 
 
@@ -46,7 +46,7 @@ class SupplyConfig:
 
 @dataclass(frozen=True)
 class LoadConfig:
-    """What a plant's motor turns.
+    """The load of a plant's motor.
 
     Attributes:
         torque_nm: a torque that keeps its direction at any speed, N m; positive brakes positive speed.
@@ -65,7 +65,7 @@ class LoadConfig:
 
 @dataclass(frozen=True)
 class CoupleConfig:
-    """What a plant's shaft is coupled to: the plant of a name, and how; ``line`` is the line of the file."""
+    """Coupling of a plant's shaft: the other plant's name, and the data; ``line`` is the line of the file."""
 
     to: str
     data: CouplingData
@@ -83,10 +83,10 @@ class PlantConfig:
         motor_overload_ratio: that of its drive, %.
         line: the line of the file.
         supply: the AC line.
-        load: what the motor turns.
+        load: the load of the motor.
         inertia: inertia of motor and load over the motor's own.
-        couple: what its shaft is coupled to, None for nothing, or where the other plant says so.
-        joint: what ROS calls its shaft; "" where that is the plant's name.
+        couple: the coupling of its shaft; None for none, or if the section of the other plant has it.
+        joint: the name of its shaft on ROS; "" if that is the plant's name.
     """
 
     name: str
@@ -101,7 +101,7 @@ class PlantConfig:
 
     @property
     def joint_name(self) -> str:
-        """What ROS calls its shaft."""
+        """The name of its shaft on ROS."""
         return self.joint or self.name
 
     @property
@@ -127,7 +127,7 @@ class JointCommand:
         joint: the name of its joint.
         interface: ``velocity`` or ``effort``.
         common: the variable's full name.
-        scale: what counts of an INTEGER mean, in rpm or N m; None for a REAL, which has these itself.
+        scale: converts the counts of an INTEGER to rpm or N m; None for a REAL, whose value is in these units.
         line: the line of the file.
     """
 
@@ -146,10 +146,10 @@ class FeedConfig:
     Attributes:
         plant: the plant's name.
         common: the variable's full name.
-        element: which element of it.
+        element: the index of the element that is written.
         signal: a name of ``drive/plant/signals.SIGNALS``.
-        every_ns: how often, ns.
-        scale: what counts of an INTEGER mean, None for a REAL, which has the signal itself.
+        every_ns: time between two samples, ns.
+        scale: converts the signal to the counts of an INTEGER; None for a REAL, which has the signal itself.
         line: the line of the file.
     """
 
@@ -163,9 +163,9 @@ class FeedConfig:
 
 
 def full_speeds(feeds: Iterable[FeedConfig]) -> dict[str, float]:
-    """Return by plant the speed (rpm) that its tachometer shows as 4095, of those whose feed brings it in counts.
+    """Return by plant the speed (rpm) that its tachometer shows as 4095, for those with a feed in counts.
 
-    A plant with several such feeds has that of the first (decision).
+    If a plant has several such feeds, the first counts (decision).
     """
     found: dict[str, float] = {}
     for feed in feeds:

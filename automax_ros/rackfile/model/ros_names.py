@@ -1,13 +1,13 @@
-"""The rack's names as names of ROS 2.
+"""The ROS 2 names of a rack and of its variables, plants and networks.
 
-The rack's own names have upper-case letters, digits and underscores only. Whatever is added here is in lower case, so
-it can never make two names equal:
+The rack's own names have upper-case letters, digits and underscores only. All additions are in lower case, so they can
+never make two names equal:
 
-- the namespace is the rack's name in lower case; one that begins with a digit, which ROS does not allow, gets
-  ``rack_`` in front (decision: a rack's name has no underscore, so no other looks like it);
+- the namespace is the rack's name in lower case; one that begins with a digit, which ROS does not allow, gets ``rack_``
+  in front (decision: a rack's name has no underscore, so no other looks like it);
 - the topic of a variable is its name without the type character: ``common/LINE_SPEED``;
 - commons that differ only in type get the type's word: ``common/SPEED_int`` and ``common/SPEED_bool``;
-- the topic of a plant is its name: ``plants/UNWIND``; that which commands its joint is a controller's:
+- the topic of a plant is its name: ``plants/UNWIND``; the topic that commands its joint is a controller's:
   ``UNWIND_velocity_controller/commands``;
 - the topic of a network of racks is ``/dcsnet/PAPER``, next to their namespaces and in none of them (decision);
 - a name that begins with an underscore gets ``u`` in front, since ROS tools hide such topics: ``common/u_SPARE``
@@ -28,7 +28,7 @@ TYPE_WORDS = {
     DataType.BOOLEAN: "bool",
     DataType.STRING: "string",
 }
-"""What tells apart the topics of variables that differ only in type."""
+"""Suffixes of the topics of variables that differ only in type."""
 
 
 def namespace(rack_name: str) -> str:
@@ -72,9 +72,9 @@ def command_topic(joint: str, interface: str) -> str:
 
 
 def network_topic(namespace: str, network: str) -> str:
-    """Return the full name of the topic that is a network's cable: ``/dcsnet/PAPER``.
+    """Return the full name of a network's topic, its cable: ``/dcsnet/PAPER``.
 
-    It is nobody's own: it stands where the racks' namespaces stand. For ``plant/line1`` it is ``/plant/dcsnet/PAPER``.
+    It is next to the racks' namespaces and belongs to none: for ``plant/line1`` it is ``/plant/dcsnet/PAPER``.
     """
     outside = namespace.rpartition("/")[0]
     return f"/{outside}/dcsnet/{network}" if outside else f"/dcsnet/{network}"

@@ -1,4 +1,4 @@
-"""A task as a rack file names it, and how many there may be."""
+"""A task in a rack file, and the limits of priorities and numbers of tasks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 MIN_PRIORITY, MAX_PRIORITY = 4, 11
 """Priorities of tasks: 4 is served first (J2-3106-1 p. 8-2)."""
 MAX_TASKS = 32
-"""Tasks of one Processor (J2-3106-1 p. 2-5)."""
+"""Most tasks of one Processor (J2-3106-1 p. 2-5)."""
 
 
 @dataclass(frozen=True)

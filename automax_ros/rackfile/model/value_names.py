@@ -1,7 +1,4 @@
-"""Texts ``TASK.NAME=VALUE`` against the tunables of a rack's tasks.
-
-Values and names that a person gives on a command line, against a rack's common variables.
-"""
+"""Names and values from a command line, checked against a rack's common variables and its tasks' tunables."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from automax_ros.language.program import Program, Symbol, lines_that_write
 from automax_ros.rackfile.model.config import CommonElement, RackConfig
 
 DEFAULT_WATCHED = 5
-"""How many variables a status line shows when nobody chose any."""
+"""Most variables that a status line shows by default."""
 _ABSENT = "the rack has no common variable"
 
 
@@ -24,7 +21,7 @@ def setting(config: RackConfig, text: str) -> tuple[str, Value]:
     """Return the name and value of ``NAME=VALUE``; the name may be that of an array's element.
 
     Raises:
-        Fault: not of that form, no such common, the value does not fit, or the rack itself writes that common (2.4.6).
+        UserError: not of that form, no such common, the value does not fit, or the rack itself writes it (2.4.6).
     """
     meant, value = named_setting(text, config.by_name, _ABSENT)
     if meant.name in PREDEFINED:
@@ -35,10 +32,10 @@ def setting(config: RackConfig, text: str) -> tuple[str, Value]:
 def watched(
     config: RackConfig, names: Sequence[str] | None, programs: Iterable[Program] = ()
 ) -> Sequence[CommonElement]:
-    """Return what the given names mean, such as ``REF%`` and ``TABLE%(3)``; without names what the rack file watches.
+    """Return the variables of these names, such as ``REF%`` and ``TABLE%(3)``; without names the file's ``watch``.
 
-    Where it says nothing either, these are the first published commons that control-block tasks among ``programs``
-    write, and after them the first others: a panel's push-buttons stand first in many files, and say least.
+    If the rack file has none either, these are the first published commons that control-block tasks among ``programs``
+    write, and after them the first others: in many files a panel's push-buttons come first, and they show least.
 
     Raises:
         NameFault: there is no such simple common or element.
@@ -58,7 +55,7 @@ def watched(
 
 
 def common_named(config: RackConfig, name: str) -> CommonElement:
-    """Return the simple common or the element of an array that a name means.
+    """Return the simple common, or the element of an array, with a name.
 
     Raises:
         NameFault: there is none.
@@ -81,10 +78,10 @@ def tunables_of(program: Program) -> dict[str, Symbol]:
 
 
 def tuning(programs: Mapping[str, Program], text: str) -> Tuning:
-    """Return what a text gives a tunable of one of the tasks, whose type character may be left out.
+    """Return the tunable and value of ``TASK.NAME=VALUE``; the type character may be left out.
 
     Raises:
-        Fault: the task has none of that name, or the value is not of its type.
+        UserError: the task has none of that name, or the value is not of its type.
         KeyError: there is no such task.
     """
     owner, _, value = text.partition("=")

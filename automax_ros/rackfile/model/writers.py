@@ -1,4 +1,4 @@
-"""Who writes common memory: the ids under which the write log knows tasks and sources outside the tasks."""
+"""The writers of common memory: the ids of tasks, and of sources outside the tasks, in the write log."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _FIRST_TASK = 3
 def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
     """Return all writers of a rack by their ids: outside sources, tasks by slot and name, modules, plants.
 
-    A module with interrupts writes registers, and one that says so; no other does. Only plants with feeds write.
+    Only modules with interrupts, or with ``by_itself``, write registers; only plants with feeds write.
     """
     home = config.common_memory_slot
     outside = [

@@ -1,8 +1,8 @@
 """Common memory modules: in slot 0 they hold the rack's common variables, in any other even slot plain registers.
 
-With several Processors one is needed in slot 0. Elsewhere a module has 64K registers of user data, whichever it is, and
-no arrays (J-3636 p. 1-1): tasks may write any of them, a variable with ``ros: in`` is an input. STOP ALL and a power
-cycle clear them, as volatile common memory (decision). They do not arbitrate the bus.
+With several Processors one is needed in slot 0. Elsewhere a module of either kind has 64K registers of user data and no
+arrays (J-3636 p. 1-1): tasks may write any of them, a variable with ``ros: in`` is an input. STOP ALL and a power cycle
+clear them, as volatile common memory (decision). They do not arbitrate the bus.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ COMMON_REGISTERS = {"57C413": 65536, "57C423": 131072}
 """16-bit registers for common variables in slot 0 (J-3636 p. 1-1)."""
 NODE = "common_memory"
 _USER_REGISTERS = Registers(65536, either=range(65536))
-"""What a module in an even slot other than 0 has (J-3636 p. 1-1)."""
+"""Registers of a module in an even slot other than 0 (J-3636 p. 1-1)."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,17 @@ class CommonMemoryConfig:
 
     @property
     def registers(self) -> Registers:
-        """Registers of user data, but not in slot 0."""
+        """Registers of user data, none in slot 0."""
         return _USER_REGISTERS if self.slot else NO_REGISTERS
 
     @property
     def common_registers(self) -> int:
-        """16-bit registers that common variables may take, in slot 0 alone."""
+        """16-bit registers for common variables, only in slot 0."""
         return 0 if self.slot else COMMON_REGISTERS[self.model]
 
 
 class CommonMemoryKind:
-    """What a rack file may say of a common memory module."""
+    """The options of a common memory module in a rack file."""
 
     word = "common memory"
     models = dict.fromkeys(COMMON_REGISTERS, "common memory module")

@@ -1,12 +1,10 @@
-"""The drive analog I/O module 57C405: the armature voltage that fast bridge change needs (52.6.1).
+"""The drive modules in a rack file: the controller 57C406 with the plant that it drives, and the analog I/O 57C405.
 
-``drive`` is the slot of the 57C406 whose armature voltage a transformer of 52.6.1 brings to connector P4. Its nominal
-voltage is the one nearest to that of the plant's line (decision). Register 0 shows the signal, 4095 counts at 10 V,
-clamped there: at each interrupt of the 57C406, every 5.5 ms while there is none. The other registers are inputs from
-outside. No source gives these registers (decision). Without ``drive`` there is no signal: register 0 is an input like
-the others.
-
-The 57C406 as a rack file configures it: its slot, and the plant that it drives.
+The 57C405 shows the armature voltage that fast bridge change needs (52.6.1). Its ``drive`` is the slot of the 57C406
+whose armature voltage a transformer of 52.6.1 brings to connector P4. Its nominal voltage is the one nearest to that of
+the plant's line (decision). Register 0 shows the signal, 4095 counts at 10 V, clamped there: at each interrupt of the
+57C406, every 5.5 ms while there is none. The other registers are inputs from outside. No source gives these registers
+(decision). Without ``drive`` there is no signal: register 0 is an input like the others.
 """
 
 from __future__ import annotations
@@ -32,9 +30,9 @@ if TYPE_CHECKING:
 TACH_THRESHOLD, PHASE_STEP, PERIOD_STEP, OPTIONS = 4136, 4137, 4138, 4146
 """The registers that an application may write (52.7)."""
 DEFAULTS = {TACH_THRESHOLD: 109, PHASE_STEP: 4, PERIOD_STEP: 2, OPTIONS: 0}
-"""What initialisation of the CML task writes to them (52.4.1, 52.5.1, 52.6.2, 52.7)."""
+"""Values that the CML task writes to them at initialisation (52.4.1, 52.5.1, 52.6.2, 52.7)."""
 ACCESS_NS = 5_000
-"""By how much an access of the application delays the microprocessor, ns (52.7, decision: no manual says how much)."""
+"""Delay of the microprocessor by an access of the application, ns (52.7, decision: no manual says how much)."""
 _COUNT = max(DEFAULTS) + 1
 _REGISTERS = Registers(
     _COUNT,
@@ -46,7 +44,7 @@ _REGISTERS = Registers(
 
 @dataclass(frozen=True)
 class DriveConfig(WithoutTasks):
-    """A 57C406; without a ``plant`` it has registers and switches only, and its loop sees no line."""
+    """A 57C406; without a ``plant`` it has registers and switches only, and its loop measures no line."""
 
     slot: int
     model: str
@@ -57,7 +55,7 @@ class DriveConfig(WithoutTasks):
 
     @property
     def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
+        """The module's name in the rack and of its node."""
         return f"drive_{self.slot}"
 
     @property
@@ -67,7 +65,7 @@ class DriveConfig(WithoutTasks):
 
 
 class DriveControllerKind:
-    """What a rack file may say of a 57C406."""
+    """The options of a 57C406 in a rack file."""
 
     word = "drive I/O controller"
     table: Mapping[str, IoModel] = MappingProxyType({"57C406": IoModel("drive I/O controller module", _REGISTERS)})
@@ -84,7 +82,7 @@ class DriveControllerKind:
         return DriveConfig(found.slot, found.model, plant, found.span.line)
 
     def check_places(self, rack: RackLayout) -> None:
-        """Find nothing wrong: no source tells of a slot where a 57C406 may not stand."""
+        """Report nothing: no source names a slot where a 57C406 may not be."""
 
 
 DRIVE_CONTROLLER = DriveControllerKind()
@@ -107,12 +105,12 @@ class DriveAnalogConfig(WithoutTasks):
 
     @property
     def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
+        """The module's name in the rack and of its node."""
         return f"drive_analog_{self.slot}"
 
 
 class DriveAnalogKind:
-    """What a rack file may say of a 57C405."""
+    """The options of a 57C405 in a rack file."""
 
     word = "drive analog I/O"
     table: Mapping[str, IoModel] = MappingProxyType({"57C405": IoModel("drive analog I/O module", _ANALOG_REGISTERS)})
@@ -122,14 +120,14 @@ class DriveAnalogKind:
     )
 
     def read(self, found: ModuleSection) -> DriveAnalogConfig:
-        """Read which drive it is wired to."""
+        """Read the drive to which it is wired."""
         node = found.section.get("drive")
         what = f"drive of {found.where}"
         drive = None if node is None else integer_value(node, what, found.findings, low=0, high=15, code="AMX6520")
         return DriveAnalogConfig(found.slot, found.model, drive, found.span.line, node.span if node else None)
 
     def check_places(self, rack: RackLayout) -> None:
-        """Report a drive that is not there, and one that has two of these modules."""
+        """Report a drive that does not exist, and one that has two of these modules."""
         controllers = {item.slot for item in rack.of(DRIVE_CONTROLLER)}
         wired: dict[int, Span] = {}
         for module in rack.modules:

@@ -1,35 +1,31 @@
-"""The pulsetach input module 57C421: a 24-bit counter, a comparator, a timer interrupt (57C421B manual p. 4-4, 4-5).
+"""I/O modules in a rack file: digital, analog, pulsetach and resolver. They have tables of registers and no keys.
 
-The counter is in the registers 0 and 1, high word first with its sign extended, to be read as a DOUBLE INTEGER; the
-update period in 2, (value + 1) x 0.5 ms; the comparator in 3 and 4, like the counter; the interrupt status and control
-register is 5, with the timer interrupt enable in bit 5, 6 defines the mode, 7 is the module's status. No source says
-what 6 and 7 hold, nor what the comparator does when it is reached: 6 can be written and does nothing, 7 stays 0, and
-the comparator is a place for a number (decision). The counter comes from outside and keeps its low 24 bits, as a
-counter that runs over does (decision).
+Digital modules. No source at hand gives their register maps; these are ours (decision): a 57C402 or 57C403 has 16
+outputs in register 0, a 57C408 16 inputs in register 0 and 16 outputs in register 1. In a drive's 57C408 bit 0 of the
+inputs is the run permissive and bit 1 the external instantaneous electronic trip (IET, TRUE trips); bits 0, 1 and 2 of
+the outputs are FMCR, RMCR and drive OK, which its 57C406 sets at each CML scan (decision). A 57C419 has 32 inputs in
+the registers 0 and 1, which freeze at its interrupt (4.0), its interrupt status and control register in 2 and its
+update period in 3.
 
-What all I/O modules have in common: registers that stand in a table, no keys of their own, no tasks, any slot.
+Analog modules: two inputs (57C409) or four outputs (57C410), 4095 counts at full scale (57C409 manual p. 3-3). A 57C409
+has its two inputs in the registers 0 and 1, their status in 4 and a control register for each in 5 and 6; that 2 and 3
+are their update periods is ours (decision). Each channel has an interrupt, at which its input freezes. The module
+drives the common clock while bit 6 is set in one of the control registers; the manual sets both (decision). The
+registers of a 57C410 are ours too (decision): four outputs in 0 to 3.
 
-Digital input and output modules: registers of 16 points.
+The pulsetach input module 57C421: a 24-bit counter, a comparator, a timer interrupt (57C421B manual p. 4-4, 4-5). The
+counter is in the registers 0 and 1, high word first with its sign extended, to be read as a DOUBLE INTEGER; the update
+period in 2, (value + 1) x 0.5 ms; the comparator in 3 and 4, like the counter; the interrupt status and control
+register is 5, with the timer interrupt enable in bit 5, 6 defines the mode, 7 is the module's status. No source gives
+the contents of 6 and 7, nor the effect of reaching the comparator: 6 can be written and does nothing, 7 stays 0, and
+the comparator only stores a number (decision). The counter comes from outside and keeps its low 24 bits, as a counter
+that overflows does (decision).
 
-No source at hand gives their register maps; these are ours (decision): a 57C402 or 57C403 has 16 outputs in register 0,
-a 57C408 16 inputs in register 0 and 16 outputs in register 1. Of a drive's 57C408 bit 0 of the inputs is the run
-permissive and bit 1 the external instantaneous electronic trip (IET, TRUE trips); bits 0, 1 and 2 of the outputs are
-FMCR, RMCR and drive OK, which its 57C406 sets at each CML scan (decision). A 57C419 has 32 inputs in the registers 0
-and 1, which freeze at its interrupt (4.0), its interrupt status and control register in 2 and its update period in 3.
-
-Analog modules: two inputs (57C409) or four outputs (57C410), 4095 counts at full scale (57C409 manual p. 3-3).
-
-A 57C409 has its two inputs in the registers 0 and 1, their status in 4 and a control register for each in 5 and 6; that
-2 and 3 are their update periods is ours (decision). Each channel has an interrupt, at which its input freezes. The
-module drives the common clock while bit 6 is set in one of the control registers, of which the manual sets both
-(decision). The registers of a 57C410 are ours too (decision): four outputs in 0 to 3.
-
-The resolver input module 57C411: position, position at the external strobe, interrupt (57C411 manual p. 4-1).
-
-Register 0 is the position, 1 that at the last edge of EXTERNAL STROBE, 2 a copy of the interrupt status and control
-register 3, 4 the update period. The unit of the period is ours, after the 57C421: 0.5 ms, less one (decision). What
-stands in the registers 0 and 1 comes from outside, as the converter would give it: bits 2 to 13 within a turn, 14 and
-15 turns. No source says of bit 12 of register 3: it can be set and does nothing (decision).
+The resolver input module 57C411: position, position at the external strobe, interrupt (57C411 manual p. 4-1). Register
+0 is the position, 1 that at the last edge of EXTERNAL STROBE, 2 a copy of the interrupt status and control register 3,
+4 the update period. The unit of the period is ours, after the 57C421: 0.5 ms, less one (decision). The registers 0 and
+1 come from outside, in the converter's format: bits 2 to 13 within a turn, 14 and 15 turns. No source describes bit 12
+of register 3: it can be set and does nothing (decision).
 """
 
 from __future__ import annotations
@@ -47,7 +43,7 @@ from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 
 
 class WithoutTasks:
-    """What the configuration of a module says that runs no tasks and holds no common variables of its own."""
+    """The common part of the configurations of modules that run no tasks and hold no common variables."""
 
     tick_ns = 0
     times = Model.NONE
@@ -63,7 +59,7 @@ class WithoutTasks:
 
 @dataclass(frozen=True)
 class IoConfig(WithoutTasks):
-    """An I/O module in any slot; ``node`` begins its name."""
+    """An I/O module in any slot; its name begins with ``node``."""
 
     slot: int
     model: str
@@ -73,13 +69,13 @@ class IoConfig(WithoutTasks):
 
     @property
     def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
+        """The module's name in the rack and of its node."""
         return f"{self.node}_{self.slot}"
 
 
 @dataclass(frozen=True)
 class IoModel:
-    """One catalogue number: what the module is, and its registers."""
+    """One catalogue number: the module's title and its registers."""
 
     title: str
     registers: Registers
@@ -95,7 +91,7 @@ class HasTable(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class IoKind:
-    """A kind of module of which a rack file says nothing but its number and its slot."""
+    """A kind of module for which a rack file gives only the number and the slot."""
 
     word: str
     node: str
@@ -104,7 +100,7 @@ class IoKind:
     options: Keys = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Derive what the other kinds say for themselves."""
+        """Derive the attributes that the other kinds define themselves."""
         titles = {number: model.title for number, model in self.table.items()}
         object.__setattr__(self, "models", MappingProxyType(titles))
 
@@ -113,7 +109,7 @@ class IoKind:
         return IoConfig(found.slot, found.model, self.node, self.table[found.model].registers, found.span.line)
 
     def check_places(self, rack: RackLayout) -> None:
-        """Find nothing wrong: no source tells of a slot where these modules may not stand."""
+        """Report nothing: no source names a slot where these modules may not be."""
 
 
 DRIVE_MODEL = "57C408"
@@ -169,7 +165,7 @@ RESOLVER = IoKind("resolver input", "resolver", {"57C411": IoModel("resolver inp
 
 
 TIMER_ENABLE = 5
-"""The bit of register 5 without which there is no timer interrupt."""
+"""The bit of register 5 that enables the timer interrupt."""
 _COUNTER_REGISTERS = Registers(
     8,
     outputs=range(2, 7),

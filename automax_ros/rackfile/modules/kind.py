@@ -1,4 +1,4 @@
-"""What a kind of module is: how its section of a rack file is read into a configuration, and where it may stand."""
+"""The interface of a kind of module: how its section of a rack file becomes a configuration, and its allowed slots."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from automax_ros.rackfile.sections.tasks import TaskReader
 
 @dataclass(frozen=True)
 class ModuleSection:
-    """A module of a rack file as its kind reads it; ``where`` names it in messages.
+    """The section of a module for its kind to read; ``where`` names the module in messages.
 
     ``executive`` is the version of the Programming Executive in tenths (``rackfile/reading/executive.py``).
     """
@@ -34,7 +34,7 @@ class ModuleSection:
 
 @dataclass(frozen=True)
 class PlacedModule:
-    """A module as the rules of places see it: all modules whose number is known, right in the rest or not."""
+    """A module for the rules of places: any module with a known number, even if the rest of it has errors."""
 
     slot: int
     model: str
@@ -44,7 +44,7 @@ class PlacedModule:
 
 @dataclass(frozen=True)
 class RackLayout:
-    """All modules of a rack file. Unless ``complete``, one could not be read and may be the one that a rule misses.
+    """All modules of a rack file. Unless ``complete``, one could not be read, and a rule may miss just that one.
 
     ``modules`` are the configurations of those that could be read, in the order of slots.
     """
@@ -61,9 +61,9 @@ class RackLayout:
 
 
 class ModuleKind(Protocol):
-    """A kind of module: what a rack file may say of it, and where it may stand.
+    """A kind of module: its options in a rack file, and its allowed slots.
 
-    ``word`` names the kind in messages; ``models`` are its catalogue numbers, each with what it is.
+    ``word`` names the kind in messages; ``models`` are its catalogue numbers, each with its title.
     """
 
     @property
@@ -74,13 +74,13 @@ class ModuleKind(Protocol):
 
     @property
     def options(self) -> Keys:
-        """The keys of its section with the schemas of their values, ``module`` left out."""
+        """The keys of its section with the schemas of their values, without ``module``."""
         ...
 
     def read(self, found: ModuleSection) -> ModuleConfig | None:
-        """Read a module's section; what is wrong goes to the findings, None where no module can be made of it."""
+        """Read a module's section; report errors in the findings, and return None if no configuration results."""
         ...
 
     def check_places(self, rack: RackLayout) -> None:
-        """Report modules of this kind that stand where none can, or that are missing."""
+        """Report modules of this kind in slots where they may not be, or that are missing."""
         ...

@@ -1,20 +1,18 @@
-"""Network modules as a rack file configures them: 57C404, with the network's name, its drop and how many it represents.
+"""Network modules 57C404 in a rack file, with the network's name, the drop and the depth.
 
 ```yaml
 12: {module: 57C404, network: PAPER, drop: 3, depth: 2}
 ```
 
-Drop 0 is the network's one master, 1 to 55 are slaves. ``depth`` says on which drops variables of a slave may stand;
-the depth with which the module communicates is that of its register 20, which a task writes (57C570 manual p. 18-7).
-Racks that name the same network in one ROS 2 domain, below the same namespace, are on one cable (decision).
+Drop 0 is the network's one master, 1 to 55 are slaves. ``depth`` is the number of drops on which variables of a slave
+may be; the depth with which the module communicates is that of its register 20, which a task writes (57C570 manual p.
+18-7). Racks that name the same network in one ROS 2 domain, below the same namespace, are on one cable (decision).
 
-The registers of a network module 57C404: 56 drop areas of 64 registers (57C570 manual p. 18-4 to 18-7).
-
-Register 64 x drop + n of the module is register n of the drop's area, for IOREAD% and IOWRITE too (decision). Of the
-area of a drop, 0 to 31 go from its slave to the master and 32 to 63 from the master to its slave. The area of drop 0
-is the module's status; 32 to 39 of it are broadcast, written in the master and read in every slave. That the 57C404
-has the map that is printed for the network part of a 57C570 is ours (decision); the manual of the 57C445 says the same
-of its drops.
+The module has 56 drop areas of 64 registers (57C570 manual p. 18-4 to 18-7). Register 64 x drop + n of the module is
+register n of the drop's area, for IOREAD% and IOWRITE too (decision). In the area of a drop, 0 to 31 go from its slave
+to the master and 32 to 63 from the master to its slave. The area of drop 0 is the module's status; 32 to 39 of it are
+broadcast, written in the master and read in every slave. That the 57C404 has the map that is printed for the network
+part of a 57C570 is ours (decision); the manual of the 57C445 says the same of its drops.
 """
 
 from __future__ import annotations
@@ -37,21 +35,21 @@ from automax_ros.rackfile.reading.values import ProblemList, integer_value, text
 AREA = 64
 """Registers of the area of one drop."""
 HALF = 32
-"""Registers that go one way; those from the master come second."""
+"""Registers that go in one direction; those from the master come second."""
 MASTER = 0
 """The drop of the master."""
 LAST_DROP = 55
 COUNT = AREA * (LAST_DROP + 1)
 
 STATUS = range(4, 8)
-"""Which drops communicate: drops 0 to 15 in the bits of the first, and so on."""
+"""The drops that communicate: drops 0 to 15 in the bits of the first register, and so on."""
 OWN_DROP, RECEIVED, TIMEOUTS, CRC_ERRORS, OVERRUNS, TRANSMITTED, DEPTH = 12, 14, 15, 16, 17, 19, 20
 """Further registers of the area of drop 0; 18, abort errors, stays 0: nothing in DDS is like it (decision)."""
 ABORTS = 18
 VALID = 0x8000
 """The bit of ``OWN_DROP`` of a module whose drop number is valid."""
 DONE, INVALID = 0x8000, 0x4000
-"""Bits of ``DEPTH``: it was processed; it was wrong, and the last good one is used."""
+"""Bits of ``DEPTH``: it was processed; it was invalid, and the last valid one is used."""
 BROADCAST = range(32, 40)
 _SHOWN = (*STATUS, OWN_DROP, RECEIVED, TIMEOUTS, CRC_ERRORS, OVERRUNS, ABORTS, TRANSMITTED)
 
@@ -72,9 +70,9 @@ def from_master(drop: int) -> range:
 
 
 def registers_of(drop: int, depth: int) -> Registers:
-    """Return the registers as the module of a drop has them, of a slave with ``depth`` drops.
+    """Return the registers of the module at a drop, for a slave with ``depth`` drops.
 
-    No point can stand on a register that the manual calls reserved, nor in a slave on drops that are not its own
+    No point can be on a register that the manual calls reserved, nor in a slave on drops that are not its own
     (decision: only the master has the areas of all drops).
     """
     own = range(drop, drop + depth)
@@ -101,7 +99,7 @@ def registers_of(drop: int, depth: int) -> Registers:
 
 @dataclass(frozen=True)
 class NetworkConfig(WithoutTasks):
-    """A 57C404: the ``network`` whose cable it is on, its ``drop``, and on how many drops variables may stand."""
+    """A 57C404: the ``network`` whose cable it is on, its ``drop``, and ``depth``, the drops with variables."""
 
     slot: int
     model: str
@@ -113,12 +111,12 @@ class NetworkConfig(WithoutTasks):
 
     @property
     def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
+        """The module's name in the rack and of its node."""
         return f"network_{self.slot}"
 
     @cached_property
     def registers(self) -> Registers:
-        """Its registers, as its drop has them."""
+        """The registers of a module at its drop."""
         return registers_of(self.drop, self.depth)
 
     @property
@@ -128,7 +126,7 @@ class NetworkConfig(WithoutTasks):
 
 
 class NetworkKind:
-    """What a rack file may say of a 57C404."""
+    """The options of a 57C404 in a rack file."""
 
     word = "network module"
     models: Mapping[str, str] = MappingProxyType({"57C404": "DCS-NET network communications module"})

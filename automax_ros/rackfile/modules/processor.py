@@ -1,11 +1,10 @@
 """AutoMax Processors: each runs up to 32 tasks on a tick of its own (J2-3106-1 p. 2-5, 10-1).
 
-The AutoMax PC3000: a Processor on a card of its own in a personal computer, a rack without a backplane.
-
-The card is the Processor/Scanner module 57C560; a 57C570 is an enclosure with one in it. The Serial module 57C565 is no
-Processor (1.3). It is written as the only module of a rack, in slot 0, though the hardware has none (decision). It
-holds its common variables itself; no I/O module can stand next to it, so there are neither points nor interrupts,
-hardware events and current minor loops (J-3675 p. 6-17). Its times are those of table 6.
+The AutoMax PC3000 is a Processor on a card in a personal computer, a rack without a backplane. The card is the
+Processor/Scanner module 57C560; a 57C570 is an enclosure with one in it. The Serial module 57C565 is not a Processor
+(1.3). It is written as the only module of a rack, in slot 0, though the hardware has none (decision). It holds its
+common variables itself; no I/O module can be next to it, so there are neither points nor interrupts, hardware events
+and current minor loops (J-3675 p. 6-17). Its times are those of table 6.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ from automax_ros.rackfile.reading.values import wrong_kind
 from automax_ros.rackfile.sections.tasks import PRIORITIES, tasks_schema
 
 MAX_PROCESSORS = 4
-"""Processors of one rack (J2-3106-1 p. 2-5)."""
+"""Most Processors of one rack (J2-3106-1 p. 2-5)."""
 _COMMON_REGISTERS = 65536
-"""Registers for commons where a Processor works alone (decision: as many as the 57C413 has)."""
+"""Registers for commons of a Processor without a common memory module (decision: as many as the 57C413 has)."""
 _TICKS_MS = tuple(time / NS_PER_MS for time in (MIN_TICK_NS, MAX_TICK_NS, TICK_STEP_NS, DEFAULT_TICK_NS))
 _TICK = re.compile(r"[0-9]{1,6}(\.[0-9]{1,9})?\Z")
 _SINCE = {"57C435": 30}
-"""The first version of the Executive with a module, in tenths, where that is not the oldest (1.1)."""
+"""First version of the Executive for a module, in tenths, if that is not the oldest (1.1)."""
 _SLOTS = range(1, 5)
-"""Where Processors stand next to a common memory module (J2-3106-1 p. 10-2)."""
+"""Slots of Processors next to a common memory module (J2-3106-1 p. 10-2)."""
 
 
 @dataclass(frozen=True)
@@ -55,17 +54,17 @@ class ProcessorConfig:
 
     @property
     def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
+        """The module's name in the rack and of its node."""
         return f"processor_{self.slot}"
 
     @property
     def times(self) -> Model:
-        """Whose execution times its tasks have."""
+        """The model whose execution times its tasks have."""
         return Model(self.model)
 
 
 class ProcessorKind:
-    """What a rack file may say of a Processor."""
+    """The options of a Processor in a rack file."""
 
     word = "processor"
     models = {"57C430A": "6010", "57C431": "6011", "57C435": "7010"}  # noqa: RUF012
@@ -85,7 +84,7 @@ class ProcessorKind:
         return ProcessorConfig(found.slot, found.model, tick, read, found.span.line)
 
     def check_places(self, rack: RackLayout) -> None:
-        """Report too few or too many Processors, and those in other slots than 1 to 4, or 0 for a Processor alone."""
+        """Report too few or too many Processors, and those in slots other than 1 to 4, or 0 for a lone Processor."""
         own = rack.of(self)
         if not rack.complete:
             return
@@ -145,17 +144,17 @@ class Pc3000Config(ProcessorConfig):
 
     @property
     def name(self) -> str:
-        """The module's name in the rack, as that of its node: there is one."""
+        """The module's name in the rack and of its node: there is only one."""
         return NODE
 
     @property
     def times(self) -> Model:
-        """Whose execution times its tasks have."""
+        """The model whose execution times its tasks have."""
         return Model.PC3000
 
 
 class Pc3000Kind(ProcessorKind):
-    """What a rack file may say of a PC3000: what it may say of a Processor."""
+    """The options of a PC3000 in a rack file: those of a Processor."""
 
     word = "PC3000"
     models = dict.fromkeys(("57C560", "57C570"), "PC3000")
@@ -166,7 +165,7 @@ class Pc3000Kind(ProcessorKind):
         return Pc3000Config(plain.slot, plain.model, plain.tick_ns, plain.tasks, plain.line)
 
     def check_places(self, rack: RackLayout) -> None:
-        """Report a PC3000 in another slot than 0, and whatever stands next to one."""
+        """Report a PC3000 in a slot other than 0, and any module next to one."""
         own = rack.of(self)
         for item in own[:1]:
             if item.slot != 0:

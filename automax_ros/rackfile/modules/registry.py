@@ -1,7 +1,7 @@
-"""The AutoMax modules that a rack file may name, and why it may not name the others.
+"""The AutoMax modules that a rack file may name, and the reasons why it may not name the others.
 
-Numbers and uses are those of the manuals' module tables; a letter after the number is the revision (57C413B), which
-the emulator does not tell apart (decision), except for the 57C430.
+Numbers and uses are those of the manuals' module tables; a letter after the number is the revision (57C413B), which the
+emulator does not distinguish (decision), except for the 57C430.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ KINDS: tuple[ModuleKind, ...] = (
     NETWORK,
     UDC,
 )
-"""All kinds of modules: whoever wants a module finds it here."""
+"""All kinds of modules."""
 SUPPORTED: dict[str, ModuleKind] = {model: kind for kind in KINDS for model in kind.models}
 """The kind of each number that a rack file may name."""
 
@@ -46,20 +46,20 @@ REFUSED = {
         "the Processor of a PC3000 is the 57C560, which a 57C570 has in it; a rack file names no Serial module",
     ),
 }
-"""Modules that no rack file names: the problem's code, what is wrong and what to do (1.1, 1.3)."""
+"""Modules that no rack file may name: the problem's code, the error and the remedy (1.1, 1.3)."""
 NOT_YET = {
     "57C414": "Modbus interface module",
     "57C416": "remote I/O module",
     "57C417": "R-Net module",
     "57C418": "A-B interface module",
 }
-"""Modules that exist but that the emulator cannot be yet."""
+"""Modules that exist but that are not emulated yet."""
 
 _NUMBER = re.compile(r"(57C?[0-9]{3})[A-Z]?\Z")
 
 
 def spellings(model: str) -> Schema:
-    """Return the schema of a module's number, in all spellings that ``module_number`` takes."""
+    """Return the schema of a module's number, in all spellings that ``module_number`` accepts."""
     letters = "".join(f"[{char}{char.lower()}]" if char.isalpha() else char for char in model)
     revision = "" if model[-1].isalpha() else "[A-Za-z]?"
     text = f"The module's number: {model}, {SUPPORTED[model].models[model]}."
@@ -68,7 +68,7 @@ def spellings(model: str) -> Schema:
 
 
 def module_number(text: str) -> str:
-    """Return a module's number as the tables here have it: ``57c413b`` is 57C413, ``B/M 57552`` is 57552."""
+    """Return a module's number in the form of these tables: ``57c413b`` is 57C413, ``B/M 57552`` is 57552."""
     plain = text.upper().removeprefix("B/M").replace("-", "").strip()
     if plain in SUPPORTED:
         return plain

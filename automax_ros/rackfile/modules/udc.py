@@ -1,12 +1,11 @@
-"""UDC modules as a rack file configures them: 57552, with a task for drive A, one for drive B, or one alone (2.3).
+"""UDC modules 57552 in a rack file: a task for drive A, one for drive B, or one alone (2.3); dual-port registers.
 
-The dual-port registers of a UDC module (S-3056 p. 3-50, SB3000 p. 3-8): which they are and who writes them.
+The registers and their writers are those of S-3056 p. 3-50 and SB3000 p. 3-8. Where no source gives them (decision):
+2002 counts the scans since the last interrupt, bit 6 of 2000 drives the common clock and its other bits mean nothing,
+the test I/O of the module (1000 to 1017) may be inputs or outputs. Registers that are not listed belong to the module's
+operating system (S-3006 p. 4-2).
 
-Of what no source gives (decision): 2002 counts the scans since the last interrupt, bit 6 of 2000 drives the common
-clock and its other bits mean nothing, the test I/O of the module (1000 to 1017) may be inputs or outputs. Registers
-that are not listed belong to the module's operating system (S-3006 p. 4-2).
-
-An estimate of what a task takes on a UDC: no source tells the size of compiled statements (decision).
+The size of a task on a UDC is an estimate: no source gives the size of compiled statements (decision).
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ STATUS = (*range(80, 90), *range(1080, 1090))
 COMMAND = (*range(100, 200), *range(1100, 1200))
 """Commands to the PMI: outputs."""
 FEEDBACK = (*range(200, 300), *range(1200, 1300))
-"""What the PMI sends back: inputs."""
+"""Feedback from the PMI: inputs."""
 TEST = range(1000, 1018)
 """Test switches and meter ports of the module."""
 EVERY_SCAN = range(300, 600)
@@ -60,7 +59,7 @@ _INPUTS = (*RAIL, *STATUS, *FEEDBACK, SCAN_COUNTER)
 _OUTPUTS = (*COMMAND, ISCR, SCANS_PER_INTERRUPT)
 _USED = frozenset((*_INPUTS, *_OUTPUTS, *TEST, *APPLICATION))
 RETAINED = frozenset((*RAIL, *STATUS, *FEEDBACK, *TEST))
-"""What STOP ALL and a power cycle leave: inputs, feedback, communication status, test switches, D/A set-up (2.4.5)."""
+"""Kept by STOP ALL and a power cycle: inputs, feedback, communication status, test switches, D/A set-up (2.4.5)."""
 
 UDC_REGISTERS = Registers(
     COUNT,
@@ -76,7 +75,7 @@ UDC_REGISTERS = Registers(
 MAX_BYTES = 20 * 1024
 """Largest UDC task (2.3)."""
 STATEMENT_BYTES = 8
-"""Estimate for a statement, a CALL included, without what stands in it (decision)."""
+"""Estimate for a statement, a CALL included, without the terms in it (decision)."""
 TERM_BYTES = 6
 """Estimate for each variable, constant, operator, function and parameter: a call and an address (decision)."""
 _VALUE_BYTES = {DataType.BOOLEAN: 1, DataType.INTEGER: 2, DataType.DOUBLE: 4, DataType.REAL: 4}
@@ -84,7 +83,7 @@ _STATE_BYTES = 4
 
 
 def estimated_bytes(program: Program) -> int:
-    """Return about how large a task is, in bytes: its code, its locals, and what its blocks keep."""
+    """Return the approximate size of a task, in bytes: its code, its locals, and the state of its blocks."""
     statements = list(statements_in_order((*program.startup, *program.scan)))
     terms = 0
     for statement, _ in statements:
@@ -101,7 +100,7 @@ def _variable_bytes(symbol: Symbol) -> int:
 
 
 def _states(program: Program) -> int:
-    """Return how many values the blocks keep."""
+    """Return the number of values in the state of the blocks."""
     return sum(
         1 if state.size is None else state.size(bound.facts)
         for bound in program.calls.values()
@@ -110,14 +109,14 @@ def _states(program: Program) -> int:
 
 
 MAX_UDCS = 10
-"""UDC modules of one rack (J2-3106-1 p. 2-5)."""
+"""Most UDC modules of one rack (J2-3106-1 p. 2-5)."""
 DRIVES = ("A", "B")
 """The drives of a UDC, in the order in which their tasks run."""
 
 
 @dataclass(frozen=True)
 class UdcConfig:
-    """A UDC module. ``tasks`` stand in the order of their drives; ``plants`` are by drive."""
+    """A UDC module. ``tasks`` are in the order of their drives; ``plants`` are by drive."""
 
     slot: int
     model: str
@@ -133,12 +132,12 @@ class UdcConfig:
 
     @property
     def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
+        """The module's name in the rack and of its node."""
         return f"udc_{self.slot}"
 
     @cached_property
     def registers(self) -> Registers:
-        """Its registers: of a drive with a PMI the module writes feedback and communication status itself."""
+        """Its registers: for a drive with a PMI the module itself writes feedback and communication status."""
         bases = [DRIVE_B if drive == "B" else 0 for drive, plant in self.plants.items() if plant.motor is not None]
         shown = frozenset(base + number for base in bases for number in WRITTEN)
         return replace(UDC_REGISTERS, shown=shown) if shown else UDC_REGISTERS
@@ -175,7 +174,7 @@ _PLANTS = may_be_empty(
 
 
 class UdcKind:
-    """What a rack file may say of a UDC."""
+    """The options of a UDC in a rack file."""
 
     word = "UDC"
     models = {"57552": "UDC module"}  # noqa: RUF012
@@ -191,7 +190,7 @@ class UdcKind:
         return UdcConfig(found.slot, found.model, in_order, _plants(found), found.span.line)
 
     def check_places(self, rack: RackLayout) -> None:
-        """Report too many UDCs; no source tells of a slot where one may not stand."""
+        """Report too many UDCs; no source names a slot where one may not be."""
         own = rack.of(self)
         if len(own) > MAX_UDCS:
             message = f"the rack has {len(own)} UDC modules; it may have at most {MAX_UDCS}"

@@ -1,1 +1,1 @@
-"""Rack files made from what an old plant left: configuration tasks, folders of sources."""
+"""Makes rack files from the remains of an old plant: configuration tasks, folders of sources."""

@@ -1,10 +1,10 @@
-"""Reads the configuration task (.CNF) of a rack, as Executives up to 2.1 had it: what it defines, line by line.
+"""Reads the configuration task (.CNF) of a rack, as in Executives up to 2.1, line by line.
 
 The manual of its language (J-3649) is not at hand. IODEF is as the ControlNet manual prints it (DSMBCN-UM001B p. 43):
-``nnnnn IODEF name [SLOT=s, REGISTER=r, BIT=b]``, where ``&`` goes on in the next line. The others are taken to have the
-same form (decision): MEMDEF and NVMEMDEF a list of variables as in COMMON; NETDEF the keys of IODEF and DROP; RIODEF,
-GBLDEF, RNETDEF, ABDEF and MODDEF a name and any keys; TASK the keys TYPE, SLOT, PRIORITY and CRITICAL. Everything else
-is reported.
+``nnnnn IODEF name [SLOT=s, REGISTER=r, BIT=b]``, where ``&`` continues in the next line. The others are assumed to have
+the same form (decision): MEMDEF and NVMEMDEF a list of variables as in COMMON; NETDEF the keys of IODEF and DROP;
+RIODEF, GBLDEF, RNETDEF, ABDEF and MODDEF a name and any keys; TASK the keys TYPE, SLOT, PRIORITY and CRITICAL.
+Everything else is reported.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ _MAX_BIT = 15
 _MOST_DIAGNOSTICS = 1000
 """Most problems of definitions that are shown (decision: a bound on untrusted texts)."""
 _PROCESSOR_SLOTS = range(5)
-"""Where a Processor can stand (J2-3106-1 p. F-4)."""
+"""Slots where a Processor can be (J2-3106-1 p. F-4)."""
 
 
 @dataclass(frozen=True)
 class DefinedCommon:
     """A variable that the configuration defines; ``keyword`` is the statement's word.
 
-    ``point`` is where IODEF puts it, or NETDEF, with the ``drop`` whose register it is.
+    ``point`` is its place by IODEF, or by NETDEF with the ``drop`` of the register.
     """
 
     declared: VariableName
@@ -70,7 +70,7 @@ class DefinedTask:
 
 @dataclass
 class Configuration:
-    """What a configuration task defines, in the order of its lines, and what in it could not be read."""
+    """The definitions of a configuration task, in the order of its lines, and the problems in it."""
 
     source: SourceText
     commons: list[DefinedCommon] = field(default_factory=list)
@@ -79,7 +79,7 @@ class Configuration:
 
 
 def read_configuration(source: SourceText) -> Configuration:
-    """Return what a configuration task defines; never raises, whatever the text."""
+    """Return the definitions of a configuration task; never raises, whatever the text."""
     reader = _Reader(source)
     reader.read()
     found = reader.found
@@ -88,7 +88,7 @@ def read_configuration(source: SourceText) -> Configuration:
 
 
 class _Fault(Exception):
-    """Ends one statement; carries what is wrong with it."""
+    """Ends one statement; carries its diagnostic."""
 
     def __init__(self, code: str, message: str, span: Span, hint: str | None = None, first: Span | None = None) -> None:
         super().__init__(message)
@@ -98,14 +98,14 @@ class _Fault(Exception):
 
 @dataclass(frozen=True)
 class _Given:
-    """A key of a definition: its value, None where it stands alone."""
+    """A key of a definition with its value, None for a key without one."""
 
     key: Token
     value: Token | None
 
 
 class _Tokens:
-    """The tokens of one statement, taken one after the other."""
+    """The tokens of one statement, read one after the other."""
 
     def __init__(self, tokens: list[Token]) -> None:
         self._tokens = tokens
@@ -170,7 +170,7 @@ class _Reader:
             self._report(fault.diagnostic)
 
     def _report(self, diagnostic: Diagnostic) -> None:
-        """Keep what is wrong, up to a limit; what comes after it is read all the same."""
+        """Keep a diagnostic, up to a limit; statements after it are read all the same."""
         if len(self.found.diagnostics) < _MOST_DIAGNOSTICS:
             self.found.diagnostics.append(diagnostic)
         elif len(self.found.diagnostics) == _MOST_DIAGNOSTICS:
@@ -180,7 +180,7 @@ class _Reader:
     # Statements
 
     def _end(self, word: Token, tokens: _Tokens) -> None:
-        """Take END, as other programs have it; no source says whether a configuration task has one (decision)."""
+        """Accept END, as in other programs; no source says whether a configuration task has one (decision)."""
 
     def _io(self, word: Token, tokens: _Tokens) -> None:
         declared, span = self._variable(tokens)
@@ -205,7 +205,7 @@ class _Reader:
         )
 
     def _network(self, word: Token, tokens: _Tokens) -> None:
-        """Read a definition on a 57C404; without its slot and drop it is one that stands elsewhere."""
+        """Read a definition on a 57C404; without its slot and drop it is treated as one that is elsewhere."""
         declared, span = self._variable(tokens)
         keys = {} if tokens.at_end else self._keys(tokens, None)
         if not {"SLOT", "DROP"} <= keys.keys():
@@ -222,7 +222,7 @@ class _Reader:
                 return
 
     def _elsewhere(self, word: Token, tokens: _Tokens) -> None:
-        """Read a definition on a network or in a remote rack, whose keys mean nothing here."""
+        """Read a definition on a network or in a remote rack, whose keys have no meaning here."""
         declared, span = self._variable(tokens)
         if not tokens.at_end:
             self._keys(tokens, None)
@@ -278,7 +278,7 @@ class _Reader:
             raise _Fault(fault.code, f"{quoted(text)}: {fault.message}", first.span, fault.hint) from fault
 
     def _keys(self, tokens: _Tokens, known: tuple[str, ...] | None) -> dict[str, _Given]:
-        """Read ``[KEY=VALUE, ...]``; any keys where ``known`` is None."""
+        """Read ``[KEY=VALUE, ...]``; any keys if ``known`` is None."""
         tokens.require("[", "the name")
         keys: dict[str, _Given] = {}
         while True:
@@ -351,4 +351,4 @@ _STATEMENTS: dict[str, _Read] = {
     "TASK": _Reader._task,
     "END": _Reader._end,
 }
-"""What a configuration task may hold (J2-3045 p. 5-36), remarks aside."""
+"""The statements of a configuration task (J2-3045 p. 5-36), apart from remarks."""

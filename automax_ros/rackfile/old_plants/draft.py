@@ -1,13 +1,11 @@
-"""A rack file for a folder of tasks: a beginning for somebody who has the sources of a plant and nothing else.
+"""Drafts a rack file for a folder of tasks, when only the sources of a plant exist.
 
 Every COMMON that a task declares becomes a common variable of the rack. The tasks share the Processors evenly; the one
-that scans most often is served first (decision). Tasks that only a UDC runs stand on UDCs (``drafting_udc``).
+that scans most often is served first (decision).
 
-UDC modules of a rack file to be: which of a folder's tasks are a UDC's, and where their commons may stand.
-
-A task is a UDC's where it calls a block that runs there alone (table 5). Two tasks of equal TICKS share a module.
-Nothing in a task says where in the dual port its commons stand: they get application registers in turn (decision),
-which the plant's drawings replace.
+A task belongs to a UDC if it calls a block that runs only there (table 5). Two tasks of equal TICKS share a UDC. A task
+does not give the places of its commons in the dual port: they get application registers in turn (decision), which the
+plant's drawings replace.
 """
 
 from __future__ import annotations
@@ -44,7 +42,7 @@ from automax_ros.rackfile.reading.names import DeclarationFault, variable_name
 
 _BITS = 16
 _PAIR_BITS = 2 * _BITS
-"""A UDC writes booleans in pairs of registers: what it writes and what it reads stand in different ones."""
+"""A UDC writes booleans in pairs of registers: those that it writes and those that it reads are in different pairs."""
 _MODEL = next(iter(UDC.models))
 
 
@@ -57,13 +55,13 @@ def is_udc_task(module: Module) -> bool:
 
 @dataclass(frozen=True)
 class DraftedUdc:
-    """A UDC module to be: its slot and its tasks, that of drive A first."""
+    """A drafted UDC module: its slot and its tasks, that of drive A first."""
 
     slot: int
     tasks: tuple[str, ...]
 
     def lines(self, files: Mapping[str, str]) -> Iterator[str]:
-        """Yield its lines of the rack file; ``files`` are what it says of the tasks' files."""
+        """Yield its lines of the rack file; ``files`` are the texts for the tasks' files."""
         yield f"  {self.slot}:"
         yield f"    module: {_MODEL}"
         yield "    tasks:"
@@ -85,9 +83,9 @@ def drafted_udcs(names: Sequence[str], programs: Mapping[str, Program | None], f
 def dual_port_places(
     udc: DraftedUdc, programs: Mapping[str, Program | None], commons: Mapping[str, CommonSpec]
 ) -> dict[str, str]:
-    """Return where the commons of a module's tasks stand, as the rack file says it, as many as there is room for.
+    """Return the places of a module's commons, as the rack file writes them, as many as there is room for.
 
-    Arrays and strings stand nowhere: `automax check` says so.
+    Arrays and strings get none: `automax check` reports them.
     """
     own = [program for name in udc.tasks if (program := programs[name]) is not None]
     used = [spec for name, spec in commons.items() if any(name in program.symbols for program in own)]
@@ -107,7 +105,7 @@ def dual_port_places(
 
 
 def _groups(simple: Sequence[CommonSpec], written: set[str]) -> Iterator[list[CommonSpec]]:
-    """Yield what stands together: booleans that the UDC writes, other booleans, numbers of two registers, of one."""
+    """Yield the groups of commons: booleans that the UDC writes, other booleans, numbers of two registers, of one."""
     flags = [spec for spec in simple if spec.type is DataType.BOOLEAN]
     yield [spec for spec in flags if spec.name in written]
     yield [spec for spec in flags if spec.name not in written]
@@ -117,13 +115,13 @@ def _groups(simple: Sequence[CommonSpec], written: set[str]) -> Iterator[list[Co
 
 _PROCESSOR = "57C435"
 _MOST_FILES = 10_000
-"""Most entries of a folder that are looked at (decision: a bound on untrusted folders)."""
+"""Most entries of a folder that are read (decision: a bound on untrusted folders)."""
 _MOST_NAMED = 4
-"""How many of the tasks that share a common are named next to it."""
+"""Most tasks that are named next to a common that they share."""
 _RACK_NAME_LIMIT = 8
 _COMMENT_COLUMN = 36
 _UNKNOWN_NS = 1 << 62
-"""Stands for the scan period of a task with errors."""
+"""Scan period of a task with errors."""
 
 
 class DraftFault(UserError):
@@ -132,7 +130,7 @@ class DraftFault(UserError):
 
 @dataclass(frozen=True)
 class DraftedTask:
-    """A task of the rack to be: its ``file`` as the rack file names it, its text, and whether a UDC alone runs it."""
+    """A task of the drafted rack: its ``file`` as in the rack file, its text, and whether only a UDC runs it."""
 
     name: str
     file: str
@@ -142,10 +140,10 @@ class DraftedTask:
 
 @dataclass
 class Draft:
-    """A rack to be. ``left_out`` are the names of files that cannot be tasks, each with the reason.
+    """A drafted rack. ``left_out`` are the names of files that cannot be tasks, each with the reason.
 
     ``commons`` are by full name, each with the place of its first declaration; ``users`` the tasks that declare it.
-    ``results`` are what the checks of the tasks against these commons found, by the tasks' names.
+    ``results`` are those of the tasks' checks against these commons, by the tasks' names.
     """
 
     name: str
@@ -208,7 +206,7 @@ class Draft:
         return {name: result.program for name, result in self.results.items()}
 
     def _udcs(self, processors: int) -> list[DraftedUdc]:
-        """Return the UDC modules, in the slots that nothing else has."""
+        """Return the UDC modules, in slots that are otherwise free."""
         drives = {slot for program in self._programs.values() for slot, _ in _drive_modules(program)}
         free = (slot for slot in range(processors + 1, MAX_SLOT + 1) if slot not in drives)
         names = [task.name for task in self.tasks if task.on_udc]
@@ -220,7 +218,7 @@ class Draft:
     def _drive_lines(self, processors: int) -> Iterator[str]:
         """Yield the modules whose slots the tasks of drives name, in the order of slots.
 
-        Where two things want one slot the first has it, and a comment names the other (decision).
+        If two modules want one slot the first gets it, and a comment names the other (decision).
         """
         taken = dict.fromkeys(range(processors + 1), "")
         lines: dict[int, list[str]] = {}
@@ -265,7 +263,7 @@ class Draft:
 
 
 def _drive_modules(program: Program | None) -> list[tuple[int, str]]:
-    """Return slots and models of the modules that the CALL of a drive's task names; none of any other task."""
+    """Return slots and models of the modules that the CALL of a drive's task names; none for any other task."""
     if program is None or program.cml is None:
         return []
     facts = program.cml.facts
@@ -273,7 +271,7 @@ def _drive_modules(program: Program | None) -> list[tuple[int, str]]:
 
 
 def _file_key(task: DraftedTask) -> str:
-    """Return the key of a task's file, where its name does not say which it is."""
+    """Return the key of a task's file, if its name is not the usual one."""
     return "" if task.file == f"{task.name}.BLK" else f"file: {_yaml_quoted(task.file)}, "
 
 
@@ -284,7 +282,7 @@ def _without_period(task: DraftedTask) -> str:
 def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
     """Collect the tasks and commons of a folder for a rack file in ``rack_folder``, which is the folder or above it.
 
-    Whatever the files hold: one that cannot be a task is left out, a faulty task is taken as far as it can be read.
+    A file that cannot be a task is left out, a task with errors is used as far as it can be read.
 
     Raises:
         DraftFault: the folder cannot be read, holds no task, or is not below ``rack_folder``.
@@ -317,7 +315,7 @@ def _sources(folder: Path) -> list[Path]:
 
 
 def _take(found: Draft, path: Path, folder: Path, inner: Path) -> None:
-    """Take a file into the draft, or note why not."""
+    """Add a file to the draft, or note why not."""
     if not path.name.isprintable():
         found.left_out.append((path.name, "has a name that no rack file can hold: rename it"))
         return
@@ -349,7 +347,7 @@ def _add_common(found: Draft, task: DraftedTask, declared: Declared) -> None:
     )
     try:
         variable_name(declaration_text(spec.name, spec.dimensions, spec.length))
-    except DeclarationFault:  # the check of the task says what is wrong with it
+    except DeclarationFault:  # the check of the task reports it
         return
     known = found.commons.setdefault(spec.name, spec)
     if task.name not in found.users[known.name]:
@@ -357,7 +355,7 @@ def _add_common(found: Draft, task: DraftedTask, declared: Declared) -> None:
 
 
 def _task_name(stem: str, taken: set[str]) -> str:
-    """Return a name for a task that its file's name suggests (2.4.1)."""
+    """Return a task's name made from its file's name (2.4.1)."""
     plain = re.sub(r"[^A-Z0-9_]", "_", stem.upper())
     plain = plain if plain[:1].isalpha() else f"T{plain}"
     name, number = plain[:TASK_NAME_LIMIT], 1
@@ -368,7 +366,7 @@ def _task_name(stem: str, taken: set[str]) -> str:
 
 
 def rack_name(title: str) -> str:
-    """Return a rack's name made of what can stand in one."""
+    """Return a rack's name made from the valid characters of a title."""
     plain = re.sub(r"[^A-Z0-9]", "", title.upper())
     return plain[:_RACK_NAME_LIMIT] or "RACK1"
 

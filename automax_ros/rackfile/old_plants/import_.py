@@ -1,4 +1,4 @@
-"""A rack file from a configuration task: what the old rack was, as far as its one file tells."""
+"""Makes a rack file from a configuration task, as far as that one file describes the old rack."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from automax_ros.rackfile.old_plants.configuration_task import Configuration, De
 from automax_ros.rackfile.old_plants.draft import commented, rack_name
 
 _PROCESSOR = "57C430A"
-"""What stands for the 57C430 of a rack with a configuration task, which does not run this software (decision)."""
+"""Replaces the 57C430 of a rack with a configuration task, which does not run this software (decision)."""
 _EXECUTIVE = "2.1"
 """The last Executive that had configuration tasks (2.1)."""
 _MEMORY = "57C413"
@@ -25,7 +25,7 @@ _NETWORK = "57C404"
 
 @dataclass
 class Imported:
-    """A rack file to be, and what is left to tell of the configuration task: tasks that it cannot name yet."""
+    """A new rack file, and the remaining diagnostics of the configuration task: tasks that it cannot name yet."""
 
     text: str
     diagnostics: list[Diagnostic] = field(default_factory=list)
@@ -37,8 +37,8 @@ def rack_file_of(
     """Return the rack file of a configuration task.
 
     ``title`` gives the rack's name; task sources lie in ``folder`` and end in one of ``suffixes``, such as ``.BLK``.
-    ``modules`` says what stands in slots of I/O points. Points in other slots become plain commons, since nothing
-    says which module is there: their place stands in a comment, with the modules that have such registers (decision).
+    ``modules`` are the modules in slots of I/O points. Points in other slots become plain commons, since their module
+    is not known: a comment has their place, and the modules that have such registers (decision).
     """
     return _Importing(configuration, folder, modules, suffixes).result(title)
 
@@ -94,7 +94,7 @@ class _Importing:
         self.diagnostics.append(Diagnostic("AMX6787", f"task {task.name} is left out: {reason}", Span(task.line, 1, 2)))
 
     def _reason(self, task: DefinedTask, file: str, number: int) -> str | None:
-        """Return why a task cannot stand in the rack file, None if it can."""
+        """Return why a task cannot be in the rack file, None if it can."""
         if f".{task.type}" not in self.suffixes:
             return f"{file}: tasks of this kind are not run"
         if task.slot == 0 and any(other.slot for other in self.configuration.tasks):

@@ -1,6 +1,6 @@
-"""Task sources of an old plant made acceptable: what DOS editors and older Executives left, changed in place.
+"""Makes task sources of an old plant acceptable: replaces remnants of DOS editors and older Executives, in place.
 
-Line numbers stay, and so does the number of lines. What is not understood is not touched.
+Line numbers stay, and so does the number of lines. Text that is not understood is not changed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
 from automax_ros.language.text.tokens import Kind, Token
 
 Check = Callable[[str], Iterable[Diagnostic]]
-"""What is wrong with a task's text."""
+"""Returns the diagnostics of a task's text."""
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f]")
 _WHOLE_NUMBER = re.compile(r"([-+ \t]*[0-9]+)([Ee][-+]?[0-9]+)?")
 _PRINT = re.compile(r"[ ]*[0-9]+[ ]+PRINT(?![A-Z0-9_%!@$])")
@@ -27,13 +27,13 @@ _LENGTH = re.compile(r"(\$)[ \t]*:[ \t]*([0-9]+)")
 _TAB = 8
 """Columns from one tab stop to the next, as DOS has them."""
 _MOST_ROUNDS = 50
-"""How often a text is gone through until nothing changes any more (decision: a bound on untrusted texts)."""
+"""Most passes over a text until nothing changes any more (decision: a bound on untrusted texts)."""
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 @dataclass(frozen=True)
 class Converted:
-    """A source as it was and as it is acceptable: texts, and ``data``, the bytes to store; ``notes`` say what changed.
+    """A source before and after its conversion: texts, and ``data``, the bytes to store; ``notes`` list the changes.
 
     Lines of ``before`` end like those of ``after``, so that the two can be compared line by line.
     """
@@ -51,7 +51,7 @@ class Converted:
 
 @dataclass
 class _Counts:
-    """How often each kind of change was made, in the words for it."""
+    """Counts of each kind of change, by its name."""
 
     numbers: dict[str, int] = field(default_factory=dict)
 
@@ -62,12 +62,12 @@ class _Counts:
 def convert(data: bytes, check: Check) -> Converted:
     """Return a source made acceptable; ``check`` finds what is left to change.
 
-    UTF-16 becomes UTF-8; a byte order mark, and Ctrl-Z with all that follows, where DOS stops reading, are left out;
-    CR LF and CR become LF. Control characters become blanks. Outside of texts between quotes tabs become blanks up to
-    the next multiple of 8 columns, and, remarks left out, lower case becomes upper case. REAL constants of blocks get
-    their decimal point, lengths of strings above 255 become 255 and a length of 0, which stood for the default, goes;
-    a text of PRINT with more than 132 characters is printed in parts
-    (decision: what an old Executive took, and the file of a DOS editor).
+    UTF-16 becomes UTF-8; a byte order mark, and Ctrl-Z with all that follows, where DOS stops reading, are left out; CR
+    LF and CR become LF. Control characters become blanks. Outside of texts between quotes tabs become blanks up to the
+    next multiple of 8 columns, and, outside of remarks, lower case becomes upper case. REAL constants of blocks get
+    their decimal point, lengths of strings above 255 become 255 and a length of 0, which meant the default, is removed;
+    a text of PRINT with more than 132 characters is printed in parts (decision: what an old Executive took, and the
+    file of a DOS editor).
     """
     text, encoding, notes = _decoded(data)
     text, _, rest = text.partition(END_OF_FILE)
@@ -84,7 +84,7 @@ def convert(data: bytes, check: Check) -> Converted:
 
 
 def _decoded(data: bytes) -> tuple[str, str, list[str]]:
-    """Return the text, the encoding to write it in, and notes; what is not UTF-8 keeps one character per byte."""
+    """Return the text, the encoding to write it in, and notes; bytes that are not UTF-8 become one character each."""
     if data.startswith(_UTF_16):
         try:
             return data.decode("utf-16"), "utf-8", ["UTF-16 written as UTF-8"]
@@ -99,7 +99,7 @@ def _decoded(data: bytes) -> tuple[str, str, list[str]]:
 
 
 def _stable(text: str, check: Check, counts: _Counts) -> str:
-    """Return a text through which one more round would change nothing."""
+    """Return a text that one more pass would not change."""
     for _ in range(_MOST_ROUNDS):
         changed = _with_constants(_in_upper_case(_without_control(text, counts), counts), check, counts)
         if changed == text:
@@ -109,7 +109,7 @@ def _stable(text: str, check: Check, counts: _Counts) -> str:
 
 
 def _without_control(text: str, counts: _Counts) -> str:
-    """Return the text with control characters and tabs outside of quotes as blanks."""
+    """Return the text with blanks for control characters, and for tabs outside of quotes."""
     lines = text.split("\n")
     quoted, _ = _ranges(text)
     for row, line in enumerate(lines):
@@ -135,7 +135,7 @@ def _plain(line: str, quoted: list[range], counts: _Counts) -> str:
 
 
 def _in_upper_case(text: str, counts: _Counts) -> str:
-    """Return the text in upper case, texts between quotes and remarks left out."""
+    """Return the text in upper case, except texts between quotes and remarks."""
     lines = text.split("\n")
     quoted, remarks = _ranges(text)
     for row, line in enumerate(lines):
@@ -180,14 +180,14 @@ def _logical_lines(text: str) -> Iterable[tuple[list[Token], int]]:
 
 
 class _Silent(Reporter):
-    """Takes what is wrong with a text without keeping it."""
+    """Discards the diagnostics of a text."""
 
     def report(self, *_: object) -> None:
-        """Keep nothing."""
+        """Discard a diagnostic."""
 
 
 def _with_constants(text: str, check: Check, counts: _Counts) -> str:
-    """Return the text with decimal points and string lengths where the check misses them."""
+    """Return the text with the decimal points and string lengths that the check misses."""
     lines = text.split("\n")
     found = [item for item in check(text) if item.code in _CURES]
     for item in sorted(found, key=lambda item: item.span, reverse=True):
@@ -214,7 +214,7 @@ def _with_length(declared: str, _: str) -> str | None:
 
 
 def _in_parts(constant: str, before: str) -> str | None:
-    """Return a long text of PRINT as several, one printed directly after the other; others cannot be divided."""
+    """Return a long text of PRINT as several, each printed directly after the last; other texts cannot be divided."""
     if not _PRINT.match(before):
         return None
     quote, text = constant[0], constant[1:-1]
@@ -228,4 +228,4 @@ _CURES: dict[str, tuple[str, _Cure]] = {
     "AMX2016": ("decimal point", _with_point),
     "AMX4008": ("string length", _with_length),
 }
-"""What is changed where the check finds a problem, by its code: from the stretch at fault and what precedes it."""
+"""Changes by the problem's code of the check: made from the text at fault and the text before it."""

@@ -1,1 +1,1 @@
-"""Values, names, scales and files as a rack file writes them."""
+"""Reads the values, names, scales and files in a rack file."""

@@ -1,4 +1,4 @@
-"""The version of the AutoMax Programming Executive that a rack was loaded with, and what it could not do yet.
+"""The version of the AutoMax Programming Executive that a rack was loaded with, and its limits.
 
 Versions are whole numbers of tenths: 42 is 4.2.
 """
@@ -22,7 +22,7 @@ _MORE_FORCES = 40
 
 
 def executive_value(node: Node, findings: ProblemList) -> int:
-    """Return a version such as 3.8 in tenths; what is wrong is reported, and gives the newest."""
+    """Return a version such as 3.8 in tenths; one with errors is reported, and the newest returned."""
     match = _VERSION.match(node.text) if isinstance(node, Scalar) and node.plain else None
     if match is None:
         wrong_kind(node, "executive", f"a version such as {version_text(NEWEST)}", findings)
@@ -36,7 +36,7 @@ def executive_value(node: Node, findings: ProblemList) -> int:
 
 
 def version_text(version: int) -> str:
-    """Return a version as people write it: 42 is 4.2."""
+    """Return a version as text: 42 is 4.2."""
     return f"{version // 10}.{version % 10}"
 
 
@@ -46,7 +46,7 @@ def most_forces(version: int) -> int:
 
 
 def tick_fault(version: int, tick_ns: int) -> str | None:
-    """Return what is wrong with a Processor's tick under a version, None if it can be."""
+    """Return the error of a Processor's tick under a version, None if it is possible."""
     if version >= _TICK_CHOSEN or tick_ns == DEFAULT_TICK_NS:
         return None
     return f"with executive {version_text(version)} the tick is 5.5 ms; it can be chosen from 3.1 on"

@@ -1,7 +1,4 @@
-"""Reads files that nobody vouches for: regular files only, within a size, and within a folder.
-
-Reads the source text of a task, which may be as old as the rack.
-"""
+"""Reads untrusted files: only regular files, within a size and within a folder. Task sources may be old."""
 
 from __future__ import annotations
 
@@ -18,19 +15,19 @@ MAX_BYTES = 1_000_000
 
 
 class FileFault(OSError):
-    """A file cannot be used; ``too_large`` tells the one reason that has its own problem code."""
+    """A file cannot be used; ``too_large`` marks the one reason that has its own problem code."""
 
     def __init__(self, message: str, *, too_large: bool = False) -> None:
-        """Keep the reason."""
+        """Create from the reason."""
         super().__init__(message)
         self.too_large = too_large
 
 
 def open_regular(path: Path) -> BufferedReader:
-    """Open a regular file for reading; a pipe or a device is refused at once, so nobody waits for its other end.
+    """Open a regular file for reading; a pipe or a device is refused at once, instead of waiting for its other end.
 
     Raises:
-        FileFault: a folder, a pipe or a device stands there.
+        FileFault: the path is a folder, a pipe or a device.
         OSError: the file does not exist or cannot be opened.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -45,7 +42,7 @@ def open_regular(path: Path) -> BufferedReader:
 
 
 def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
-    """Return what a regular file holds.
+    """Return the bytes of a regular file.
 
     Raises:
         FileFault: the file does not exist, is not a regular file, cannot be read, or has more than ``limit`` bytes.
@@ -63,7 +60,7 @@ def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
 
 
 def is_inside(path: Path, folder: Path) -> bool:
-    """Whether a path, all symbolic links followed, ends inside a folder; FALSE where that cannot be told."""
+    """Return whether a path, all symbolic links followed, ends inside a folder; FALSE if that cannot be determined."""
     try:
         return path.resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):
@@ -71,9 +68,9 @@ def is_inside(path: Path, folder: Path) -> bool:
 
 
 def lies_next_to(path: Path, other: Path) -> bool:
-    """Whether a path ends in the folder in which another file stands, or below, all symbolic links followed.
+    """Return whether a path ends in or below the folder of another file, all symbolic links followed.
 
-    Where every installed file is a link to its source, a rack file and its tasks meet there (colcon).
+    If every installed file is a link to its source (colcon), a rack file and its tasks meet there.
     """
     try:
         return path.resolve().is_relative_to(other.resolve().parent)
@@ -82,7 +79,7 @@ def lies_next_to(path: Path, other: Path) -> bool:
 
 
 def stays_next_to(text: str, other: Path) -> bool:
-    """Whether a path that a file names leads to its own folder or below: relative, without .., links followed."""
+    """Return whether a path in a file leads to the file's folder or below: relative, without .., links followed."""
     windows = PureWindowsPath(text)
     if PurePosixPath(text).is_absolute() or windows.drive or windows.root or ".." in windows.parts:
         return False

@@ -1,6 +1,6 @@
-"""Names of the rack file: rack, tasks, and common variables with type, length and subscripts (2.4.1 to 2.4.4).
+"""Names in the rack file: rack, tasks, and common variables with type, length and subscripts (2.4.1 to 2.4.4).
 
-Words that cannot name a common variable, since no task could use it.
+Words that no task could use as a variable cannot name a common.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _RACK = re.compile(r"[A-Z0-9]{1,8}\Z")
 RACK_NAME = "^[A-Za-z0-9]{1,8}$"
 TASK_NAME = f"^[A-Za-z][A-Za-z0-9_]{{0,{TASK_NAME_LIMIT - 1}}}$"
 COMMON_NAME = f"^[A-Za-z_][A-Za-z0-9_]{{0,{NAME_LIMIT - 1}}}([%!@]|\\$(:[0-9]{{1,3}})?)?\\s*([(\\[][0-9, ]*[)\\]])?$"
-"""The same as patterns of a JSON schema, in lower case too: the reader says so and goes on."""
+"""The same as patterns of a JSON schema, which accept lower case too: the reader warns of it and continues."""
 _TASK = re.compile(r"[A-Z][A-Z0-9_]*\Z")
 _BARE = re.compile(r"[A-Z_][A-Z0-9_]*\Z")
 _DECLARATION = re.compile(
@@ -55,7 +55,7 @@ class VariableName:
 
 
 def is_rack_name(text: str) -> bool:
-    """Whether a text is a rack's name: 1 to 8 letters and digits (J2-3045 p. 5-23)."""
+    """Return whether a text is a rack's name: 1 to 8 letters and digits (J2-3045 p. 5-23)."""
     return _RACK.match(text) is not None
 
 
@@ -74,7 +74,7 @@ def check_task_name(text: str) -> None:
 
 
 def variable_name(text: str) -> VariableName:
-    """Return what a key of ``common`` in upper case declares: ``A%``, ``TABLE%(10)``, ``MESSAGE$:50(3)``.
+    """Return the declaration in a key of ``common`` in upper case: ``A%``, ``TABLE%(10)``, ``MESSAGE$:50(3)``.
 
     Raises:
         DeclarationFault: AMX6400 not a name, AMX6404 subscripts, AMX6405 length of a string.
@@ -133,5 +133,5 @@ def _dimensions(text: str | None) -> tuple[int, ...]:
 
 
 def is_reserved(name: str) -> bool:
-    """Whether a variable's name with its type character is a word or a function of the language."""
+    """Return whether a variable's name with its type character is a word or a function of the language."""
     return name in RESERVED_WORDS or name in FUNCTIONS or name in REFUSED_FUNCTIONS

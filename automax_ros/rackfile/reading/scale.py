@@ -1,7 +1,7 @@
-"""`scale` of a common variable: its counts on the module, and what they mean in the engineer's unit.
+"""`scale` of a common variable: converts its counts on the module to the engineer's unit.
 
-On ROS 2 the variable is a Float32 in that unit, both ways. Everywhere else, in tasks, `--set`, stimuli, reports and
-recordings of common memory, it is counts (decision).
+On ROS 2 the variable is a Float32 in that unit, in both directions. Everywhere else, in tasks, `--set`, stimuli,
+reports and recordings of common memory, it is counts (decision).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Scale:
     value: tuple[float, float]
 
     def value_of(self, counts: int) -> float:
-        """Return what counts mean; beyond the two points the line goes on (decision: nothing true is hidden)."""
+        """Return the value of counts; beyond the two points the line continues (decision: nothing true is hidden)."""
         (first, last), (low, high) = self.counts, self.value
         if counts == last:
             return high
@@ -58,7 +58,7 @@ class Scale:
 
 
 def scale_of(node: Node, declared: VariableName, span: Span, findings: ProblemList) -> Scale | None:
-    """Read ``{counts: [a, b], value: [x, y]}``; None where there was something to report."""
+    """Read ``{counts: [a, b], value: [x, y]}``; None if a problem was reported."""
     what = f"scale of {declared.name}"
     entries = entries_of(node, what, findings)
     if entries is None:
@@ -95,7 +95,7 @@ def _values(section: Section, what: str, findings: ProblemList) -> tuple[float, 
 
 
 def _pair(section: Section, key: str, what: str, findings: ProblemList) -> tuple[Node, ...]:
-    """Return the two items of a list, () (reported) where there is something else."""
+    """Return the two items of a list, () (reported) if it is anything else."""
     node = section.get(key)
     assert node is not None
     if not isinstance(node, Sequence) or len(node.items) != 2:

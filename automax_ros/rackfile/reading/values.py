@@ -1,8 +1,6 @@
-"""Mappings of a rack file: known keys, each once, and none missing.
+"""Values in a rack file, each checked in its place: text, numbers, TRUE and FALSE, sections with known keys.
 
-Collects what is wrong with a rack file.
-
-Single values of a rack file: text, numbers, TRUE and FALSE, each checked where it stands.
+``ProblemList`` collects the diagnostics.
 """
 
 from __future__ import annotations
@@ -28,13 +26,13 @@ class ProblemList:
     """The diagnostics of one file so far."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Create without diagnostics."""
         self._items: dict[Severity, list[Diagnostic]] = {Severity.ERROR: [], Severity.WARNING: []}
         self._refused: set[Span] = set()
         self._lower_case = False
 
     def add(self, code: str, message: str, span: Span, hint: str | None = None, notes: tuple[Note, ...] = ()) -> None:
-        """Report a problem, unless the YAML at this very place was already refused as such."""
+        """Report a problem, unless the YAML at this very place was already refused."""
         if span in self._refused:
             return
         items = self._items[PROBLEMS[code].severity]
@@ -42,17 +40,17 @@ class ProblemList:
             items.append(Diagnostic(code, message, span, hint=hint, notes=notes))
 
     def refuse(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
-        """Report that the text at a place cannot be taken for what it is; later problems of that place are not new."""
+        """Report that the text at a place is refused; later problems of that place are not reported."""
         self.add(code, message, span, hint)
         self._refused.add(span)
 
     def yaml_flaw(self, flaw: Flaw, message: str, span: Span, hint: str | None) -> None:
-        """Report what ``read_yaml`` finds: AMX6003 syntax, AMX6004 parts of YAML that are not read, AMX6005 size."""
+        """Report a flaw from ``read_yaml``: AMX6003 syntax, AMX6004 parts of YAML that are not read, AMX6005 size."""
         report = self.refuse if flaw is Flaw.EXTRA else self.add
         report(_YAML_CODES[flaw], message, span, hint)
 
     def upper_case(self, text: str, span: Span) -> str:
-        """Return a name of the rack in upper case; the first that was not gets a warning (semantics, BASIC)."""
+        """Return a name of the rack in upper case; warn at the first that was not (semantics, BASIC)."""
         upper = text.upper() if text.isascii() else text
         if upper != text and not self._lower_case:
             self._lower_case = True
@@ -71,12 +69,12 @@ class ProblemList:
 
 
 _OCTAL = re.compile(r"[-+]?0+[0-9]")
-"""Leading zeros make another number in YAML."""
+"""Leading zeros make YAML read another number."""
 _T = TypeVar("_T", int, float)
 
 
 def kind_of(node: Node) -> str:
-    """Return in words what a node is, for messages that wanted something else."""
+    """Return the kind of a node in words, for messages that expected another."""
     if isinstance(node, Mapping):
         return "keys and values"
     if isinstance(node, Sequence):
@@ -87,7 +85,7 @@ def kind_of(node: Node) -> str:
 
 
 def wrong_kind(node: Node, what: str, wanted: str, findings: ProblemList, hint: str | None = None) -> None:
-    """Report that ``what`` is not of the kind it must be."""
+    """Report that ``what`` is not of the required kind."""
     findings.add("AMX6008", f"{what} must be {wanted}, not {kind_of(node)}", node.span, hint)
 
 
@@ -107,7 +105,7 @@ def text_value(node: Node, what: str, findings: ProblemList, *, limit: int) -> s
 
 
 def is_clean(text: str) -> bool:
-    """Whether a text has only printable characters and tabs: nothing that ends a line or breaks an encoding."""
+    """Return whether a text has only printable characters and tabs: nothing that ends a line or breaks an encoding."""
     return all(char.isprintable() or char == "\t" for char in text)
 
 
@@ -121,17 +119,17 @@ def boolean_value(node: Node, what: str, findings: ProblemList) -> bool | None:
 
 
 def integer_value(node: Node, what: str, findings: ProblemList, *, low: int, high: int, code: str) -> int | None:
-    """Return a whole number from ``low`` to ``high``; ``code`` is the problem where it is not in this range."""
+    """Return a whole number from ``low`` to ``high``; ``code`` is the problem of one outside this range."""
     return _number(node, what, "a whole number", whole_number, findings, (low, high, code))
 
 
 def number_value(node: Node, what: str, findings: ProblemList, *, low: float, high: float, code: str) -> float | None:
-    """Return a number from ``low`` to ``high``; ``code`` is the problem where it is not in this range."""
+    """Return a number from ``low`` to ``high``; ``code`` is the problem of one outside this range."""
     return _number(node, what, "a number", number, findings, (low, high, code))
 
 
 def is_plain_word(node: Node) -> TypeGuard[Scalar]:
-    """Whether a node is a single value without quotes, and without the leading zeros that YAML reads as octal."""
+    """Return whether a node is a value without quotes, and without the leading zeros that YAML reads as octal."""
     return isinstance(node, Scalar) and node.plain and not _OCTAL.match(node.text)
 
 
@@ -159,7 +157,7 @@ def _number(
 
 
 def number_hint(node: Node) -> str | None:
-    """Return what to do about a value that looks like a number but is not read as one."""
+    """Return a hint for a value that looks like a number but is not read as one."""
     if not isinstance(node, Scalar) or len(node.text) > 60:
         return None
     if not node.plain and is_number(node.text):
@@ -174,7 +172,7 @@ Entry = tuple[Scalar, Node]
 
 
 def entries_of(node: Node, what: str, findings: ProblemList) -> tuple[Entry, ...] | None:
-    """Return keys and values, () for a key without a value; None (reported) where something else stands."""
+    """Return keys and values, () for a key without a value; None (reported) for anything else."""
     if isinstance(node, Mapping):
         return node.entries
     if isinstance(node, Scalar) and node.is_null:
@@ -186,7 +184,7 @@ def entries_of(node: Node, what: str, findings: ProblemList) -> tuple[Entry, ...
 class Section:
     """A mapping whose keys have fixed names.
 
-    Reports AMX6006 a key twice and AMX6007 a key that is not known.
+    Reports AMX6006 for a repeated key and AMX6007 for an unknown key.
     """
 
     def __init__(
@@ -199,7 +197,7 @@ class Section:
     ) -> None:
         """Sort the entries; ``what`` names the section in messages, ``known`` are its keys.
 
-        ``hints`` say of keys that people look for what does their work.
+        ``hints`` have, for unknown keys that users may try, the right ones.
         """
         self._values: dict[str, Entry] = {}
         for key, value in entries:
@@ -216,7 +214,7 @@ class Section:
         return key in self._values
 
     def get(self, key: str) -> Node | None:
-        """Return the value of a key, None where the file does not have it."""
+        """Return the value of a key, None if the file does not have it."""
         entry = self._values.get(key)
         return entry[1] if entry else None
 

@@ -1,8 +1,7 @@
-"""The ``common`` section: the rack's common variables and their options.
+"""The ``common`` section: the rack's common variables, their options and their presets.
 
-Values that common variables have when the rack starts, each in the variable's own type.
-
-The hardware has no presets; in the emulator one is a write by the rack at time 0 (semantics, Scan, memory, tasks).
+Presets are in the variable's own type. The hardware has none; in the emulator a preset is a write by the rack at time 0
+(semantics, Scan, memory, tasks).
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ _CODE = "AMX6406"
 def preset_value(
     node: Node, variable: VariableName, elements: int, findings: ProblemList
 ) -> Value | tuple[Value, ...] | None:
-    """Return the preset of a variable with ``elements`` values; None where there was something to report."""
+    """Return the preset of a variable with ``elements`` values; None if a problem was reported."""
     what = f"preset of {variable.name}"
     if not isinstance(node, Sequence):
         return _one(node, variable, what, findings)
@@ -110,7 +109,7 @@ OPTIONS: Keys = {
     "description": line("A line about the variable.", DESCRIPTION_LIMIT),
     **KEYS,
 }
-"""What may be said of a common variable."""
+"""The keys of a common variable."""
 SCHEMA: Schema = may_be_empty(
     entries(
         "The rack's common variables: name, type character, length of a string, largest subscripts.",
@@ -127,7 +126,7 @@ class CommonReader:
     def __init__(
         self, modules: Iterable[ModuleConfig], findings: ProblemList, unread: frozenset[int] = frozenset()
     ) -> None:
-        """Begin with no variables; I/O points stand on ``modules``, or in slots whose module could not be read."""
+        """Create without variables; I/O points are on ``modules``, or in slots whose module could not be read."""
         self._points = PointReader(modules, findings, unread)
         self._findings = findings
         self._names: dict[str, Span] = {}
@@ -137,7 +136,7 @@ class CommonReader:
         self._left_span = Span(1, 1, 2)
 
     def read(self, node: Node) -> tuple[CommonVariable, ...]:
-        """Return the variables that are right, in the order of the file."""
+        """Return the variables without errors, in the order of the file."""
         entries = entries_of(node, "common", self._findings) or ()
         variables = [self._variable(key, value) for key, value in entries]
         self._report_left_closed()

@@ -1,4 +1,4 @@
-"""The key ``couple`` of a plant: another plant's shaft, and what is between the two."""
+"""The key ``couple`` of a plant: the shaft of another plant, and the coupling between the two."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SCHEMA: Schema = section("What couples the shaft to that of another plant.", KEY
 
 
 def read_couple(node: Node, what: str, findings: ProblemList) -> CoupleConfig | None:
-    """Return what a plant is coupled to, None where there was something to report."""
+    """Return the coupling of a plant, None if a problem was reported."""
     where = f"couple of {what}"
     entries = entries_of(node, where, findings)
     if entries is None:
@@ -56,7 +56,7 @@ def read_couple(node: Node, what: str, findings: ProblemList) -> CoupleConfig | 
 
 
 def check_couples(plants: Mapping[str, PlantConfig], findings: ProblemList) -> None:
-    """Report couplings to nothing, or of a plant that is coupled already; then those that cannot be simulated."""
+    """Report couplings to unknown plants, or of a plant that is coupled already; then impossible ones."""
     taken: dict[str, int] = {}
     before = findings.errors
     for name, config in plants.items():
@@ -88,7 +88,7 @@ def _check(
 
 
 def _try(plants: Mapping[str, PlantConfig], findings: ProblemList) -> None:
-    """Report what only shows when the plants are made."""
+    """Report errors that appear only when the plants are built."""
     made = build_plants(plants.values())
     for config in plants.values():
         try:

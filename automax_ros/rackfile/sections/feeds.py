@@ -1,4 +1,4 @@
-"""The key ``feeds`` of a plant: its signals into commons, as instruments would bring them."""
+"""The key ``feeds`` of a plant: its signals that instruments bring into commons."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def read_feeds(
     modules: Sequence[ModuleConfig],
     findings: ProblemList,
 ) -> tuple[FeedConfig, ...]:
-    """Return the feeds of all plants; what is wrong goes to the findings. Commons with errors are not looked for."""
+    """Return the feeds of all plants; report errors in the findings. Commons with errors are not looked up."""
     reader = _FeedReader(variables, modules, findings)
     found = [
         reader.read(plant, key, value)
@@ -51,7 +51,7 @@ class _FeedReader:
         self._fed: dict[str, Span] = {}
 
     def read(self, plant: str, key: Scalar, node: Node) -> FeedConfig | None:
-        """Return one feed, None where there was something to report."""
+        """Return one feed, None if a problem was reported."""
         findings = self._findings
         where = f"feed {printable(key.text)} of plant {plant}"
         entries = entries_of(node, where, findings)
@@ -86,7 +86,7 @@ class _FeedReader:
         return number_value(node, f"every_ms of {where}", self._findings, low=LEAST_MS, high=MOST_MS, code=CODE)
 
     def _target(self, key: Scalar, where: str) -> Element[CommonVariable] | None:
-        """Return the common that a feed writes, None (reported) where it cannot."""
+        """Return the common that a feed writes, None (reported) if it may not."""
         findings = self._findings
         try:
             found = element_named(key.text, self._variables, _ABSENT)
@@ -117,7 +117,7 @@ class _FeedReader:
         return ""
 
     def _scale(self, section: Section, variable: CommonVariable, where: str, span: Span) -> Scale | None:
-        """Return what counts mean: as the feed says, else as the common itself does (decision)."""
+        """Return the scale of the counts: the feed's, else the common's own (decision)."""
         node = section.get("scale")
         if node is not None:
             return scale_of(node, VariableName(variable.name, variable.type, 0, ()), span, self._findings)

@@ -1,8 +1,7 @@
-"""The key ``joint`` of a plant: its shaft as a joint of ROS, with commands as ros2_control's controllers take them.
+"""The key ``joint`` of a plant: its shaft as a joint of ROS, with the commands of ros2_control's controllers.
 
 In the rack file commands are in rpm and N m, as all of a plant (decision); on ROS they are in rad/s and N m (REP-103).
-A command writes a common with ``ros: in`` and no other, so the key opens no way into the rack that was closed
-(decision).
+A command writes only a common with ``ros: in``, so the key opens no way into the rack that was closed (decision).
 """
 
 from __future__ import annotations
@@ -25,14 +24,14 @@ JOINT_NAME = r"[A-Za-z](?:_?[A-Za-z0-9])*"
 LONGEST_NAME = 40
 """Most characters of a joint's name (decision: its topics then stay readable)."""
 INTERFACES = {"velocity": math.pi / 30.0, "effort": 1.0}
-"""What a joint is commanded by (ros2_control's names), and the factor from the rack file's unit to ROS's."""
+"""The command interfaces of a joint (ros2_control's names), each with the factor from the rack file's unit to ROS's."""
 UNITS = {"velocity": "rpm", "effort": "N m"}
 """The rack file's units."""
 COMMAND_KEYS: Keys = {
     "common": named("The common that a command writes; it has `ros: in`.", r"^[A-Za-z_][A-Za-z0-9_]{0,15}[%!]?$"),
     "scale": SCALE,
 }
-"""What may be said of a command."""
+"""The keys of a command."""
 KEYS: Keys = {
     "name": named("What ROS calls the joint; the plant's name if left out.", f"^{JOINT_NAME}$"),
     **{
@@ -40,14 +39,14 @@ KEYS: Keys = {
         for interface, unit in UNITS.items()
     },
 }
-"""What may be said of a joint."""
+"""The keys of a joint."""
 SCHEMA: Schema = may_be_empty(section("The shaft as a joint of ROS.", KEYS))
 _NAME = re.compile(JOINT_NAME + r"\Z")
 
 
 @dataclass(frozen=True)
 class GivenJoint:
-    """The commands of a joint as the file has them: the plant, the joint's name, (interface, what stands there)."""
+    """The commands of a joint in the file: the plant, the joint's name, (interface, node of its value)."""
 
     plant: str
     name: str
@@ -55,7 +54,7 @@ class GivenJoint:
 
 
 def read_joint(node: Node, plant: str, findings: ProblemList) -> GivenJoint:
-    """Return the joint of a plant, named as the plant unless the file says more; what is wrong goes to findings."""
+    """Return the joint of a plant, by default with the plant's name; report errors in the findings."""
     where = f"joint of plant {plant}"
     section = Section(entries_of(node, where, findings) or (), where, KEYS, findings)
     named = section.get("name")
@@ -66,7 +65,7 @@ def read_joint(node: Node, plant: str, findings: ProblemList) -> GivenJoint:
 
 
 def check_joint_names(names: Mapping[str, tuple[str, Span]], findings: ProblemList) -> None:
-    """Report joints of one name; ``names`` are those of the plants, with the place of each plant."""
+    """Report joints with the same name; ``names`` are those of the plants, with the place of each plant."""
     seen: dict[str, str] = {}
     for plant, (name, span) in names.items():
         if name in seen:

@@ -1,4 +1,4 @@
-"""Which commons the commands of joints write."""
+"""The commons that the commands of joints write."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ABSENT = "the rack has no common variable"
 def read_commands(
     given: Iterable[GivenJoint], variables: Sequence[CommonVariable], findings: ProblemList
 ) -> tuple[JointCommand, ...]:
-    """Return the commands of all joints; what is wrong goes to findings. Commons with errors are not looked for."""
+    """Return the commands of all joints; report errors in the findings. Commons with errors are not looked up."""
     reader = _CommandReader(variables, findings)
     found = [reader.read(joint, interface, node) for joint in given for interface, node in joint.commands]
     return tuple(command for command in found if command is not None)
@@ -37,7 +37,7 @@ class _CommandReader:
         self._commanded: dict[str, str] = {}
 
     def read(self, joint: GivenJoint, interface: str, node: Node) -> JointCommand | None:
-        """Return one command, None where there was something to report."""
+        """Return one command, None if a problem was reported."""
         findings = self._findings
         where = f"{interface} of the joint of plant {joint.plant}"
         entries = entries_of(node, where, findings)
@@ -55,7 +55,7 @@ class _CommandReader:
         return JointCommand(joint.plant, joint.name, interface, variable.name, scale, node.span.line)
 
     def _common(self, node: Node, where: str) -> CommonVariable | None:
-        """Return the common that a command writes, None (reported) where it cannot."""
+        """Return the common that a command writes, None (reported) if it may not."""
         findings = self._findings
         text = text_value(node, f"common of {where}", findings, limit=100)
         if text is None:
@@ -87,7 +87,7 @@ class _CommandReader:
         return "", None
 
     def _scale(self, section: Section, variable: CommonVariable, where: str, span: Span) -> Scale | None:
-        """Return what counts mean. A common's own scale is that of its topic, in whatever unit: it is not taken."""
+        """Return the scale of the counts. A common's own scale is not used: it is that of its topic, in any unit."""
         node = section.get("scale")
         if node is not None:
             return scale_of(node, VariableName(variable.name, variable.type, 0, ()), span, self._findings)

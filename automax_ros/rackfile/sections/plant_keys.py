@@ -1,7 +1,4 @@
-"""The keys of a feed, and what they take.
-
-The keys ``line``, ``load`` and ``inertia`` of a plant.
-"""
+"""The keys ``line``, ``load`` and ``inertia`` of a plant, and the keys of a feed with their values."""
 
 from __future__ import annotations
 
@@ -29,7 +26,7 @@ _SUPPLY_KEYS: Keys = {
 LOAD = {"torque_nm": (-1e6, 1e6), "friction_nm": (0.0, 1e6), "speed_rpm": (-10_000.0, 10_000.0)}
 """Ranges of a load's numbers (decision)."""
 LEAST_INERTIA, MOST_INERTIA = 1.0, 10_000.0
-"""Range of ``inertia`` (decision): it counts the motor's own, which is 1."""
+"""Range of ``inertia`` (decision): it includes the motor's own, which is 1."""
 MOST_PAIRS = 100
 """Most pairs of ``torque_per_rpm`` (decision)."""
 _LOAD_KEYS: Keys = {
@@ -48,7 +45,7 @@ _TORQUE = (
     "write load: {torque_nm: 100}; ros: in there lets ROS 2 set it, stimuli set load_torque_nm, couple: joins shafts"
 )
 LOAD_HINTS = dict.fromkeys(("torque_from", "torque", "torque_common", "torque_ref"), _TORQUE)
-"""What does the work of keys that people look for."""
+"""Hints for keys that users may try."""
 SUPPLY_SCHEMA: Schema = may_be_empty(section("The AC line of the drive.", _SUPPLY_KEYS))
 LOAD_SCHEMA: Schema = may_be_empty(section("What the motor turns.", _LOAD_KEYS))
 INERTIA_SCHEMA: Schema = number("Inertia of motor and load over the motor's own.", LEAST_INERTIA, MOST_INERTIA, 1)
@@ -56,7 +53,7 @@ _ALONE = "speed_rpm"
 
 
 def read_supply(node: Node, what: str, findings: ProblemList) -> SupplyConfig:
-    """Return a plant's AC line; what is wrong goes to the findings."""
+    """Return a plant's AC line; report errors in the findings."""
     where = f"line of {what}"
     section = Section(entries_of(node, where, findings) or (), where, _SUPPLY_KEYS, findings)
     return SupplyConfig(
@@ -66,7 +63,7 @@ def read_supply(node: Node, what: str, findings: ProblemList) -> SupplyConfig:
 
 
 def read_load(node: Node, what: str, findings: ProblemList) -> LoadConfig:
-    """Return a plant's load; what is wrong goes to the findings."""
+    """Return a plant's load; report errors in the findings."""
     where = f"load of {what}"
     section = Section(entries_of(node, where, findings) or (), where, _LOAD_KEYS, findings, LOAD_HINTS)
     _check_alone(section, where, findings)
@@ -81,7 +78,7 @@ def read_load(node: Node, what: str, findings: ProblemList) -> LoadConfig:
 
 
 def read_inertia(node: Node, what: str, findings: ProblemList) -> float:
-    """Return a plant's inertia over its motor's own, 1 where there was something to report."""
+    """Return a plant's inertia over its motor's own, 1 if a problem was reported."""
     where = f"inertia of {what}"
     found = number_value(node, where, findings, low=LEAST_INERTIA, high=MOST_INERTIA, code=CODE)
     return 1.0 if found is None else found
@@ -108,7 +105,7 @@ def _standard(node: Node | None, where: str, findings: ProblemList) -> bool:
 
 
 def _check_alone(section: Section, where: str, findings: ProblemList) -> None:
-    """Report a held shaft with other loads: none of them would matter."""
+    """Report a held shaft with other loads, which would have no effect."""
     others = [key for key in ("torque_nm", "torque_per_rpm", "friction_nm", "ros") if key in section]
     if _ALONE in section and others:
         message = f"{where} holds the shaft at a speed: {others[0]} has no effect"
@@ -150,7 +147,7 @@ def _pair(node: Node, what: str, findings: ProblemList) -> tuple[float, float] |
 
 
 LEAST_MS, MOST_MS, USUAL_MS = 0.1, 10_000.0, 1.0
-"""Range of ``every_ms``, and what it is without the key (decision: an instrument is quicker than most scans)."""
+"""Range of ``every_ms``, and its default (decision: an instrument is quicker than most scans)."""
 FEED_KEYS: Keys = {
     "signal": words("What the instrument shows.", SIGNALS),
     "every_ms": number("How often it is written, ms.", LEAST_MS, MOST_MS, USUAL_MS),

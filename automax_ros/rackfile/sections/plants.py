@@ -1,6 +1,6 @@
 """Reads the ``plants`` section: the motors and loads that drives turn. A plant belongs to one drive of one module.
 
-A plant without ``motor`` is not simulated: its drive's parameters are all there is (decision).
+A plant without ``motor`` is not simulated: it has only its drive's parameters (decision).
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ KEYS: Keys = {
     "motor_overload_ratio": whole("Motor Overload Ratio of the drive, %.", MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO),
     **_SIMULATED,
 }
-"""What may be said of a plant."""
+"""The keys of a plant."""
 SCHEMA: Schema = may_be_empty(
     entries(
         "The lines, motors and loads of drives, by their names.",
@@ -87,7 +87,7 @@ _LIMIT = 100
 
 @dataclass
 class Plants:
-    """The plants of one rack file, and who has claimed them; ``feeds`` and ``joints`` are read on with the commons."""
+    """The plants of one rack file, and the drives that claim them; ``feeds`` and ``joints`` are read with commons."""
 
     findings: ProblemList
     known: dict[str, PlantConfig] = field(default_factory=dict)
@@ -97,7 +97,7 @@ class Plants:
     _claimed: dict[str, tuple[str, Span]] = field(default_factory=dict)
 
     def claim(self, node: Node, what: str) -> PlantConfig | None:
-        """Return the plant that a module names for ``what``, None (reported) where there is none to have."""
+        """Return the plant that a module names for ``what``, None (reported) if there is none or it is claimed."""
         text = text_value(node, what, self.findings, limit=_LIMIT)
         if text is None:
             return None
@@ -118,7 +118,7 @@ class Plants:
 
 
 def read_plants(node: Node | None, findings: ProblemList) -> Plants:
-    """Return the plants of the section; what is wrong goes to the findings."""
+    """Return the plants of the section; report errors in the findings."""
     plants = Plants(findings)
     if node is None:
         return plants

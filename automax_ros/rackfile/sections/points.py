@@ -18,7 +18,7 @@ KEYS: Keys = {
     "register": whole("Register of the module; a DOUBLE INTEGER takes this one and the next.", 0, 65535),
     "bit": whole("Bit of the register, for a BOOLEAN; 0 is the lowest.", 0, 15),
 }
-"""Where a point stands."""
+"""The keys of a point's place."""
 _SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32, DataType.REAL: 32}
 """Bits of the types that a point may have (J2-3045 p. 7-1); a REAL only on the application registers of a UDC."""
 
@@ -29,14 +29,14 @@ class PointReader:
     def __init__(
         self, modules: Iterable[ModuleConfig], findings: ProblemList, unread: frozenset[int] = frozenset()
     ) -> None:
-        """Take the modules of the rack that are right, and the slots of the others: nothing is said of points there."""
+        """Create from the modules without errors, and the slots of the others: points there are not checked."""
         self._unread = unread
         self._modules = {module.slot: module for module in modules}
         self._findings = findings
         self._named: dict[tuple[int, int, int], tuple[str, Span]] = {}
 
     def read(self, section: Section, declared: VariableName, span: Span) -> Point | None:
-        """Return where a variable stands on a module, None where it is in common memory or its place is wrong."""
+        """Return a variable's place on a module, None if it is in common memory or its place is wrong."""
         given = [key for key in KEYS if key in section]
         if not given:
             return None
@@ -87,7 +87,7 @@ class PointReader:
         return None if drop is None else drop * registers.area
 
     def check_input(self, point: Point, declared: VariableName, span: Span) -> None:
-        """Report a point that the process shall write, where its module or tasks alone do."""
+        """Report a point for the process to write, if only its module or tasks may write it."""
         module = self._modules[point.slot]
         place = module.registers.place(point.register)
         hint = "leave out ros, or write ros: out"
@@ -99,7 +99,7 @@ class PointReader:
             self._findings.add("AMX6494", message, span, hint)
 
     def _suits(self, declared: VariableName, module: ModuleConfig, taken: range, section: Section) -> bool:
-        """Report two registers of which a task may write only one, and a REAL where none can stand."""
+        """Report two registers of which a task may write only one, and a REAL on registers that cannot hold one."""
         message, place = "", section.key_span("register")
         own = [register for register in taken if register in module.registers.reserved]
         if own:
@@ -117,7 +117,7 @@ class PointReader:
         return not message
 
     def _is_possible(self, section: Section, declared: VariableName) -> bool:
-        """Report what no point can be: an array, a REAL or a string, non-volatile, a word with a bit."""
+        """Report points that are impossible: an array, a REAL or a string, non-volatile, a word with a bit."""
         message = ""
         place = section.key_span(next(key for key in KEYS if key in section))
         if declared.dimensions or declared.type not in _SIZES:

@@ -1,4 +1,4 @@
-"""The tasks of a module, as its ``tasks`` section lists them."""
+"""The tasks of a module, from its ``tasks`` section."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LISTED_FILES = 1000
 
 @dataclass(frozen=True)
 class TaskPlace:
-    """Where a task stands among those of its module: ``priority`` orders them, ``drive`` is that of a UDC's task."""
+    """Place of a task among those of its module: ``priority`` orders them, ``drive`` is that of a UDC's task."""
 
     priority: int
     drive: str = ""
@@ -39,7 +39,7 @@ class TaskPlace:
 class TaskPlaces(Protocol):
     """How a kind of module orders its tasks.
 
-    ``key`` says it in a task's section, for example with ``sample``; ``most`` tasks run on one module.
+    ``key`` is the key for it in a task's section, ``sample`` an example of its value; ``most`` tasks run on one module.
     """
 
     @property
@@ -53,16 +53,16 @@ class TaskPlaces(Protocol):
 
     @property
     def schema(self) -> Schema:
-        """The schema of what stands after the key."""
+        """The schema of the key's value."""
         ...
 
     def read(self, node: Node, what: str, findings: ProblemList) -> TaskPlace | None:
-        """Return what the key of a task says, None (reported) where it is wrong."""
+        """Return the value of a task's key, None (reported) if it has errors."""
         ...
 
 
 class Priorities:
-    """A Processor's tasks: priorities, several tasks of one priority if need be."""
+    """A Processor's tasks: by priority, of which several tasks may have the same."""
 
     key, sample, most = "priority", "8", MAX_TASKS
     schema = whole("4 is served first; equal ones in the order of their names.", MIN_PRIORITY, MAX_PRIORITY)
@@ -84,7 +84,7 @@ def tasks_schema(places: TaskPlaces) -> Schema:
 
 
 def _keys(places: TaskPlaces) -> Keys:
-    """Return what may be said of a task."""
+    """Return the keys of a task."""
     file = "The source, .BLK or .BAS, below the rack file's folder; without the key the task's name with .BLK or .BAS."
     return {
         "file": line(file, _PATH_LIMIT),
@@ -97,8 +97,8 @@ def _keys(places: TaskPlaces) -> Keys:
 class TaskReader:
     """Reads the tasks of all modules of a rack, whose names must differ.
 
-    Sources lie in the folder of ``rack_file``, or of the file that it is a link to, unless ``allow_outside``. Without
-    a rack file none is touched: the sources are stored under their tasks' names, whatever the rack file calls them.
+    Sources lie in the folder of ``rack_file``, or of the file that it is a link to, unless ``allow_outside``. Without a
+    rack file none is read: the sources are stored under their tasks' names, whatever their files in the rack file.
     """
 
     rack_file: Path | None
@@ -107,7 +107,7 @@ class TaskReader:
     seen: dict[str, Span] = field(default_factory=dict)
 
     def read(self, node: Node, where: str, places: TaskPlaces = PRIORITIES) -> tuple[TaskConfig, ...]:
-        """Return the tasks of one module that are right; ``where`` names it in messages."""
+        """Return the tasks of one module without errors; ``where`` names the module in messages."""
         entries = entries_of(node, f"tasks of {where}", self.findings) or ()
         if len(entries) > places.most:
             message = f"{where} has {len(entries)} tasks; it runs at most {places.most}"
@@ -152,7 +152,8 @@ class TaskReader:
     def _file(self, node: Node | None, key: Scalar, name: str | None, what: str) -> Path | None:
         """Return the source's path; without the key it is the task's name with .BLK, as in the Executive (2.4.1).
 
-        Where there is no such file, but one with .BAS, that is it (decision); a ladder task (.PC) is told as such.
+        If there is no such file, but one with .BAS, that one is used (decision); a ladder task (.PC) is reported as
+        such.
         """
         if self.rack_file is None:
             return Path(f"{name}.BLK") if name is not None else None

@@ -1,4 +1,4 @@
-"""`watch` of a rack file: the commons that are worth looking at, in the order in which they are shown."""
+"""`watch` of a rack file: the commons to show, in this order."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ SCHEMA: Schema = listed(
 def read_watch(
     node: Node, variables: Sequence[CommonVariable], findings: ProblemList
 ) -> tuple[CommonElement, ...] | None:
-    """Return what a rack file watches; what is wrong goes to findings.
+    """Return the commons that a rack file watches; report errors in the findings.
 
-    Commons are not looked for while anything else of the file is wrong: theirs may be what is.
+    Commons are not looked up while the file has other errors, which may be in the commons.
     """
     if not isinstance(node, YamlList):
         wrong_kind(node, "watch", "a list of commons", findings, "write watch: [REF%, RUN@]")

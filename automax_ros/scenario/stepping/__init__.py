@@ -1,1 +1,1 @@
-"""A rack that goes on by ticks, scans and BASIC lines."""
+"""Steps a rack by ticks, scans and BASIC lines."""

@@ -1,4 +1,4 @@
-"""Executes chosen scans BASIC line by BASIC line, so that they can be held in the middle; all others at once."""
+"""Executes chosen scans line by line, so that they can be held in the middle; all others at once."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from automax_ros.runtime.tasks.task import ScanRecord
 
 
 class HeldScan:
-    """A scan that has begun and waits before a line. ``line`` is that line, 0 before ``advance`` was called."""
+    """A scan that has started and is held before a line. ``line`` is that line, 0 before ``advance`` was called."""
 
     def __init__(self, item: ScheduledTask, now_ns: int, skipped: int) -> None:
-        """Begin nothing yet: ``advance`` goes to the first line."""
+        """Create the scan without executing it: ``advance`` goes to the first line."""
         task = item.task
         self.item = item
         self.line = 0
@@ -31,9 +31,9 @@ class HeldScan:
         )
 
     def advance(self) -> bool:
-        """Go to the next line; FALSE where the scan has ended, which ``finish`` tells.
+        """Go to the next line; return FALSE if the scan has ended, which ``finish`` reports.
 
-        ``values`` are then what the scan holds by names of its layout: locals, block states, and its latched commons.
+        ``values`` are then the scan's values by names of its layout: locals, block states, and its latched commons.
         """
         try:
             self.line, values = next(self._steps)
@@ -44,25 +44,25 @@ class HeldScan:
         return True
 
     def finish(self) -> None:
-        """Tell of the scan that has ended; others may begin by that."""
+        """Report the ended scan, which may start other scans."""
         self.item.statistics.skipped += self._skipped
         self.item.done(self._record)
 
     def close(self) -> None:
-        """Give the scan up: the task is as before it; what it has written to memory stays."""
+        """Abandon the scan: the task is as before it; its writes to memory stay."""
         self._steps.close()
 
 
 class ByLines:
-    """An execution that holds the scans of some tasks: those in ``held_tasks``. ``held`` is the scan that waits."""
+    """An execution that holds the scans of the tasks in ``held_tasks``. ``held`` is the scan that waits."""
 
     def __init__(self) -> None:
-        """Hold nobody."""
+        """Create an execution that holds no task."""
         self.held_tasks: dict[str, ScheduledTask] = {}
         self.held: HeldScan | None = None
 
     def begin(self, job: Job, now_ns: int, skipped: int) -> None:
-        """Execute a job, or hold it for whoever steps."""
+        """Execute a job, or hold it."""
         item = self.held_tasks.get(job.name)
         if item is None:
             job.whole(now_ns, skipped)
@@ -70,7 +70,7 @@ class ByLines:
             self.held = HeldScan(item, now_ns, skipped)
 
     def advance(self) -> bool:
-        """Go to the next line of the held scan; FALSE where it has ended: then none is held, or one that follows it."""
+        """Go to the next line of the held scan; return FALSE at its end: then none is held, or one that follows it."""
         held = self.held
         assert held is not None
         if held.advance():
@@ -84,13 +84,13 @@ class ByLines:
         return self.held is not None and self.held.item is job
 
     def drop(self, job: Job) -> None:
-        """Give a held scan up."""
+        """Abandon a held scan."""
         if self.held is not None and self.held.item is job:
             self.held.close()
             self.held = None
 
     def place(self, job: Job) -> Place | None:
-        """Return None: a held scan has no place that another rack could go on from."""
+        """Return None: another rack could not continue a held scan."""
         return IDEAL.place(job)
 
     def resume(self, job: Job, place: Place, steps: Steps | None) -> None:

@@ -1,4 +1,4 @@
-"""A rack under a person's hand: it goes on by ticks, scans and BASIC lines, and halts where it was told to.
+"""Steps a rack by hand: by ticks, scans and BASIC lines, up to breakpoints.
 
 stepper = Stepper(config)
 stepper.start()
@@ -26,11 +26,11 @@ from automax_ros.scenario.stepping.held_scans import ByLines
 from automax_ros.scenario.stepping.variables import Change, Variable, Variables
 
 LONGEST_WAIT_NS = 60_000_000_000
-"""How long a step to a task's next scan lasts at most: the task may wait for an event (decision)."""
+"""Longest step to a task's next scan: the task may wait for an event (decision)."""
 
 
 class Why(enum.Enum):
-    """Why a rack halts."""
+    """The reasons for which a rack halts."""
 
     DONE = "done"
     TIME = "the time is over"
@@ -42,7 +42,7 @@ class Why(enum.Enum):
 
 @dataclass(frozen=True)
 class Halt:
-    """Where a rack halts: ``task`` and ``line`` where it is in the middle of a scan, before that line."""
+    """Where a rack halts: in the middle of a scan of ``task``, before ``line``, if these are set."""
 
     why: Why
     at_ns: int
@@ -53,7 +53,7 @@ class Halt:
 
 
 class Stepper:
-    """Steps one rack in simulated time. ``interrupted`` is asked between events whether to halt."""
+    """Steps one rack in simulated time. ``interrupted`` is called between events and returns whether to halt."""
 
     def __init__(self, config: RackConfig, *, interrupted: Callable[[], bool] = lambda: False) -> None:
         """Build the rack; nothing runs yet.
@@ -81,10 +81,10 @@ class Stepper:
         return (held.item.name, held.line) if held is not None else ("", 0)
 
     def break_at(self, task: str, line: int) -> None:
-        """Halt before a BASIC line of a task whenever a scan comes to it.
+        """Halt before a BASIC line of a task whenever a scan reaches it.
 
         Raises:
-            Fault: there is no such task or line, or scans of the task cannot be held.
+            UserError: there is no such task or line, or scans of the task cannot be held.
         """
         item = self._steppable(task)
         found = item.task.compiled.scan_lines.lines
@@ -107,10 +107,10 @@ class Stepper:
         return variable
 
     def clear(self, what: str) -> None:
-        """Take a breakpoint away: ``SPEED:1130``, a variable's name, or ``all``.
+        """Remove a breakpoint: ``SPEED:1130``, a variable's name, or ``all``.
 
         Raises:
-            Fault: there is no such breakpoint.
+            UserError: there is no such breakpoint.
         """
         plain = "".join(what.split()).upper()
         lines = [item for item in self.lines if plain in ("ALL", f"{item[0]}:{item[1]}")]
@@ -123,7 +123,7 @@ class Stepper:
         self._hold()
 
     def value(self, name: str) -> Value:
-        """Return what a variable holds.
+        """Return the value of a variable.
 
         Raises:
             NameFault: there is no such variable.
@@ -131,18 +131,18 @@ class Stepper:
         return self.variables.find(name).read()
 
     def go(self, for_ns: int) -> Halt:
-        """Go on for a time at most."""
+        """Run for a time at most."""
         return self._go(self.rack.now_ns + for_ns, lambda: False)
 
     def until(self, time_ns: int) -> Halt:
-        """Go on to a rack time at most; nothing of that instant has happened then."""
+        """Run to a rack time at most; nothing of that instant has happened then."""
         return self._go(time_ns, lambda: False)
 
     def ticks(self, number: int, task: str = "") -> Halt:
-        """Go on for ticks of a task's Processor, or of the rack's first module with tasks.
+        """Run for ticks of a task's Processor, or of the rack's first module with tasks.
 
         Raises:
-            Fault: there is no such task.
+            UserError: there is no such task.
         """
         modules = self.rack.task_modules
         if task:
@@ -151,10 +151,10 @@ class Stepper:
         return self.go(number * modules[0].config.tick_ns)
 
     def scan(self, task: str = "") -> Halt:
-        """Go on until a task has ended a scan, or any task where none is named.
+        """Run until a task has ended a scan, or any task if none is named.
 
         Raises:
-            Fault: there is no such task, or it does not run.
+            UserError: there is no such task, or it does not run.
         """
         tasks = [self._running(task)] if task else self.rack.scheduled
         before = {item.name: item.statistics.scans for item in tasks}
@@ -164,10 +164,10 @@ class Stepper:
         )
 
     def line(self, task: str = "") -> Halt:
-        """Go on to the next line of the scan that is held; between scans to the first line of the next scan of a task.
+        """Go to the next line of the held scan, or between scans to the first line of a task's next scan.
 
         Raises:
-            Fault: there is no such task, it does not run, or its scans cannot be held.
+            UserError: there is no such task, it does not run, or its scans cannot be held.
         """
         if self._execution.held is not None:
             before = self._read()
@@ -184,7 +184,7 @@ class Stepper:
             self._hold()
 
     def _go(self, end_ns: int, is_done: Callable[[], bool]) -> Halt:
-        """Go on by single events until something says halt."""
+        """Execute single events until there is a reason to halt."""
         stopped = self.rack.operations.stopped
         while True:
             before = self._read()
@@ -205,7 +205,7 @@ class Stepper:
                 return self._halt(Why.INTERRUPTED, before)
 
     def _through_scan(self) -> bool:
-        """Execute the held scan to its next breakpoint, TRUE, or to its end, FALSE."""
+        """Execute the held scan to its next breakpoint and return TRUE, or to its end and return FALSE."""
         before = self._read()
         while self._execution.advance():
             if self.place in self.lines or self._at_once or self._read() != before:
@@ -213,7 +213,7 @@ class Stepper:
         return False
 
     def _follows(self) -> bool:
-        """Go to the first line of a scan that the end of another has begun; FALSE where there is none."""
+        """Go to the first line of a scan that the end of another has started; return FALSE if there is none."""
         return self._execution.held is not None and self._execution.advance()
 
     def _halt(self, why: Why, before: dict[str, Value]) -> Halt:

@@ -17,7 +17,7 @@ from automax_ros.scenario.stepping.held_scans import ByLines
 
 @dataclass(frozen=True)
 class Variable:
-    """A simple variable or an array's element. ``task`` is whose it is, "" for a common."""
+    """A simple variable or an array's element. ``task`` is its task, "" for a common."""
 
     label: str
     type: DataType
@@ -28,7 +28,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Change:
-    """What a variable was before a step, and after it."""
+    """Values of a variable before and after a step."""
 
     label: str
     before: Value
@@ -37,16 +37,16 @@ class Change:
 
 @dataclass(frozen=True)
 class Variables:
-    """Finds the variables of a rack; in a held scan a task's own are as they are at its line."""
+    """Finds variables of a rack; a task's own have, in a held scan, their values at its line."""
 
     rack: Rack
     execution: ByLines
 
     def find(self, name: str) -> Variable:
-        """Return the variable that a name means.
+        """Return the variable with a name.
 
         Raises:
-            NameFault: there is none, or no element.
+            NameFault: there is no such variable or element.
         """
         return self._of_task(name) if "." in name else self._common(name)
 

@@ -1,4 +1,4 @@
-"""What an operator does, as actions of stimuli: each calls the rack's operation of that name."""
+"""Operations of an operator as actions of stimuli: each calls the rack's operation of that name."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class OnTask:
     operation: Callable[[str], None]
 
     def do(self, _: WavePlayer) -> None:
-        """Do it."""
+        """Execute it."""
         self.operation(self.of)
 
 
@@ -35,20 +35,20 @@ class OnRack:
     of: str = ""
 
     def do(self, _: WavePlayer) -> None:
-        """Do it."""
+        """Execute it."""
         self.operation()
 
 
 @dataclass(frozen=True)
 class OnValue:
-    """A value that the operator gives something: a force, a tunable."""
+    """A value for a variable: a force, a tunable."""
 
     of: str
     value: Value
     operation: Callable[[str, Any], None]
 
     def do(self, _: WavePlayer) -> None:
-        """Give it."""
+        """Set it."""
         self.operation(self.of, self.value)
 
 
@@ -62,7 +62,7 @@ class Reload:
     rack: Rack
 
     def do(self, _: WavePlayer) -> None:
-        """Install it; one that has errors leaves the old one running."""
+        """Install it; if it has errors the old one continues."""
         try:
             self.rack.operations.reload(self.of, self.source, keep_state=self.keep_state)
         except RackError as error:
@@ -71,7 +71,7 @@ class Reload:
 
 @dataclass(frozen=True)
 class Control:
-    """Moves a control of what ``of`` names, such as a module's test switch."""
+    """Moves a control of the module or plant ``of``, such as a test switch."""
 
     of: str
     control: str

@@ -1,7 +1,4 @@
-"""The verb on what stands in a rack: controls of modules.
-
-How the stimuli verb ``plant`` is read: what happens to the plants of a rack.
-"""
+"""Reads the stimuli verbs ``module``, on controls of modules, and ``plant``, on plants of a rack."""
 
 from __future__ import annotations
 
@@ -23,7 +20,7 @@ from automax_ros.scenario.stimuli.stage import Action
 
 
 def read_plant_work(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
-    """Return what is done to plants: ``{UNWIND: {short_scr: 3}}``."""
+    """Return the actions on plants: ``{UNWIND: {short_scr: 3}}``."""
     controls = SwitchOperations(rack)
     found: list[Action] = []
     for key, item in named(node, what, findings):
@@ -46,7 +43,7 @@ def read_plant_work(rack: Rack, node: Node, what: str, findings: ProblemList) ->
 
 
 def _text(verb: Scalar, node: Node, where: str, findings: ProblemList) -> str | None:
-    """Return the value of a verb as commands and services write it, None where there was something to report."""
+    """Return the value of a verb as commands and services write it; None if a problem was reported."""
     known = VERBS.get(verb.text)
     if known is None:
         message = f"{where} has no control {quoted(verb.text)}"
@@ -73,7 +70,7 @@ def _plain(node: Node) -> str:
 
 
 def _joined(verb: PlantVerb, node: Mapping, what: str, findings: ProblemList) -> str:
-    """Return the values of a form with keys, one after the other; "" where there was something to report.
+    """Return the values of a form with keys, one after the other; "" if a problem was reported.
 
     A value that is left out before another is the usual one.
     """
@@ -97,7 +94,7 @@ def _module(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Ac
     controls, by_slot = SwitchOperations(rack), {module.config.slot: module for module in rack.modules}
     found: list[Action] = []
     for key, item in named(node, what, findings):
-        plain = Scalar(key.text, True, key.span)  # JSON knows keys in quotes only
+        plain = Scalar(key.text, True, key.span)  # JSON accepts only keys in quotes
         slot = integer_value(plain, f"slot of {what}", findings, low=0, high=15, code="AMX6200")
         if slot is None:
             continue
@@ -115,7 +112,7 @@ def _module(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Ac
 
 @dataclass(frozen=True)
 class _Given:
-    """A control of the file with the value that it is moved to."""
+    """A control in the file with its new position."""
 
     key: Scalar
     verb: str

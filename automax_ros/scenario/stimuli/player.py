@@ -1,4 +1,4 @@
-"""Lets the entries of a stimuli file happen at their times."""
+"""Executes the entries of a stimuli file at their times."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ _KEY = EventKey(EventClass.OUTSIDE, ENTRIES, "stimuli")
 
 
 class StimuliPlayer:
-    """Posts one event at a time: that of the next instant with entries.
+    """Schedules one event at a time: that of the next instant with entries.
 
-    ``happened`` are the operations so far, refused ones too, and values that were refused; ``refused`` counts
-    those. ``is_acting`` is TRUE while an entry does something, ``is_common`` while what is written is written in every
-    process of a distributed rack.
+    ``happened`` are the operations so far, refused ones too, and values that were refused; ``refused`` counts those.
+    ``is_acting`` is TRUE while an entry is executed, ``is_common`` while every process of a distributed rack writes the
+    same.
     """
 
     def __init__(self, stimuli: Sequence[Stimulus], scheduler: Scheduler) -> None:
-        """Take entries in any order; nothing is posted yet."""
+        """Create from entries in any order; nothing is scheduled yet."""
         self._waiting = deque(in_time(stimuli))
         self._stage = WavePlayer(scheduler)
         self.happened: list[OperationRecord] = []
@@ -31,10 +31,10 @@ class StimuliPlayer:
         self._told = 0
 
     def begin(self, *, joining: bool = False) -> None:
-        """Begin; entries of the present and of times that have passed happen now, in their order.
+        """Start; entries of now and of times that have passed are executed now, in their order.
 
-        ``Rack.start`` calls it before it puts tasks into RUN. With ``joining`` they have happened already in the rack's
-        other processes, which know what came of them.
+        ``Rack.start`` calls it before it puts tasks into RUN. With ``joining`` the rack's other processes have executed
+        them already, and know the results.
         """
         now_ns = self._stage.scheduler.now_ns
         while joining and self._waiting and self._waiting[0].at_ns <= now_ns:
@@ -48,7 +48,7 @@ class StimuliPlayer:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing is still to come: no entry and no sample."""
+        """Whether no entry and no sample is left."""
         return not self._waiting and not self._stage.is_driving
 
     def news(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""How the verbs that operate a rack are read: force, tune, run, stop, reload, power and the others."""
+"""Reads the verbs that operate a rack: force, tune, run, stop, reload, power and the others."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _PATH_LIMIT = 200
 
 
 def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> Mapping[str, Verb]:
-    """Return all verbs of a rack. Sources to reload lie in the folder of the stimuli file or of the rack file."""
+    """Return all verbs of a rack. Sources to reload must be in the folder of the stimuli file or of the rack file."""
     tasks = _Tasks(rack)
     sources = _Sources(rack, stimuli_file, allow_outside)
     operations = rack.operations
@@ -64,7 +64,7 @@ def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> Mappin
 
 
 def _switch(operation: Callable[[], None]) -> Read:
-    """Return the reader of a verb that takes ``true`` and nothing else."""
+    """Return the reader of a verb that accepts only ``true``."""
 
     def read(node: Node, what: str, findings: ProblemList) -> list[Action]:
         if boolean_value(node, what, findings) is False:
@@ -75,7 +75,7 @@ def _switch(operation: Callable[[], None]) -> Read:
 
 
 def names_of(node: Node, what: str, findings: ProblemList) -> list[Scalar]:
-    """Return the names of a list; one name needs no list."""
+    """Return the names of a list; a single name needs no list."""
     items = node.items if isinstance(node, Sequence) else (node,)
     found = [item for item in items if isinstance(item, Scalar) and not item.is_null]
     for item in items:
@@ -91,7 +91,7 @@ class _Tasks:
     rack: Rack
 
     def task(self, key: Scalar, findings: ProblemList) -> Task | None:
-        """Return a task, None for one in another process of a distributed rack, which sees to it (decision)."""
+        """Return a task; None for one in another process of a distributed rack, which executes the entry (decision)."""
         name = findings.upper_case(key.text, key.span)
         known = {task.name: task for task in self.rack.tasks}
         if name not in known and not self.rack.part.is_elsewhere(name):
@@ -100,7 +100,7 @@ class _Tasks:
         return known.get(name)
 
     def each(self, operation: Callable[[str], None], every: Callable[[], None] | None = None) -> Read:
-        """Return the reader of a verb on tasks; with ``every`` the word all means the whole rack."""
+        """Return the reader of a verb on tasks; with ``every`` the word ``all`` means the whole rack."""
 
         def read(node: Node, what: str, findings: ProblemList) -> list[Action]:
             if every is not None and isinstance(node, Scalar) and node.text == ALL:
@@ -231,7 +231,7 @@ class _Sources:
         return _file(file, f"file of {what}", findings) if file is not None else None, bool(keeps)
 
     def _source(self, node: Scalar, task: Task, findings: ProblemList) -> SourceText | None:
-        """Return a source, read now: what is in the file later makes no difference (decision)."""
+        """Return a source, read now: later changes of the file have no effect (decision)."""
         text, suffix = node.text, Path(self.rack.sources[task.name].name).suffix.upper()
         if Path(text).suffix.upper() != suffix:
             message = f"{quoted(text)} cannot replace task {task.name}, whose source is a {suffix} file"

@@ -1,4 +1,4 @@
-"""Reads a stimuli file: a list of entries, each a time and a verb. Everything wrong with it is found before a run.
+"""Reads a stimuli file: a list of entries, each a time and a verb. All errors in it are found before a run.
 
 A file has at most 2,000,000 bytes and 50,000 entries (decision: it is untrusted, and is read as a whole).
 """
@@ -33,12 +33,12 @@ RACK_ONLY = (
     "force", "unforce", "tune", "run", "stop", "delete", "reload", "run_all", "stop_all", "clear_errors", "power",
     "plant", "module",
 )  # fmt: skip
-"""Verbs that a task alone does not have: it has no operator and no modules."""
+"""Verbs that a lone task does not have: it has no operator and no modules."""
 
 
 @dataclass(frozen=True)
 class StimuliFile:
-    """What came of a file: its entries in their order, None with errors. ``source`` is what diagnostics refer to."""
+    """Result of reading a file: its entries in their order, None with errors. Diagnostics refer to ``source``."""
 
     stimuli: tuple[Stimulus, ...] | None
     diagnostics: list[Diagnostic]
@@ -51,12 +51,12 @@ class StimuliFile:
 
 
 def read_for_rack(path: Path, rack: Rack, *, allow_outside: bool = False) -> StimuliFile:
-    """Read a file for a rack that is built; it may use all verbs."""
+    """Read a file for a built rack; it may use all verbs."""
     return _read(path, rack_verbs(rack, path, allow_outside=allow_outside), ())
 
 
 def read_for_task(path: Path, lone: StandaloneTask) -> StimuliFile:
-    """Read a file for a task alone: set, ramp, sine and square on its variables."""
+    """Read a file for a lone task: set, ramp, sine and square on its variables."""
     return _read(path, value_verbs(LoneSignals(lone)), RACK_ONLY)
 
 

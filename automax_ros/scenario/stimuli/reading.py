@@ -1,4 +1,4 @@
-"""What readers of stimuli verbs share: names with values, times, values of signals, each checked where it stands."""
+"""Shared by the readers of stimuli verbs: names with values, times, values of signals, each checked in its place."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from automax_ros.scenario.stimuli.signals import Signal, Signals
 from automax_ros.scenario.stimuli.stage import Action
 
 Read = Callable[[Node, str, ProblemList], Sequence[Action]]
-"""Takes what stands after a verb, how to call it in messages, and whom to tell what is wrong with it."""
+"""Called with the node after a verb, the verb's name in messages, and the list for its problems."""
 
 
 @dataclass(frozen=True)
 class Verb:
-    """How a verb is read; ``is_value`` where it only writes values, ``everywhere`` as ``Stimulus`` has it."""
+    """Reader of a verb; ``is_value`` if it only writes values, ``everywhere`` as in ``Stimulus``."""
 
     read: Read
     is_value: bool = False
@@ -39,9 +39,9 @@ class Verb:
 
 
 def named(node: Node, what: str, findings: ProblemList) -> Iterator[Entry]:
-    """Yield names with what stands after each; a name that stands twice is reported, as is a verb without any.
+    """Yield names with the node after each; a repeated name is reported, as is a verb without names.
 
-    What YAML has cut off a name at a comma is passed over: the beginning of the name is reported.
+    The rest of a name that YAML cut off at a comma is skipped: the start of the name is reported.
     """
     entries = entries_of(node, what, findings)
     if entries == ():
@@ -59,7 +59,7 @@ def named(node: Node, what: str, findings: ProblemList) -> Iterator[Entry]:
 
 
 def signal_of(key: Scalar, signals: Signals, findings: ProblemList) -> Signal | None:
-    """Return the signal that a key names."""
+    """Return the signal with the name in a key."""
     try:
         return signals.find(key.text)
     except UserError as fault:
@@ -68,14 +68,14 @@ def signal_of(key: Scalar, signals: Signals, findings: ProblemList) -> Signal | 
 
 
 def cut_short(name: str) -> str | None:
-    """Return what to do about a name that YAML has cut at a comma between its subscripts."""
+    """Return the hint for a name that YAML cut off at a comma between its subscripts."""
     if ("(" in name) == (")" in name):
         return None
     return 'a name with several subscripts needs quotes here: "DIAG%(1,0)"'
 
 
 def value_for(node: Node, signal: Signal, findings: ProblemList) -> Value | None:
-    """Return the value that a node gives a signal, as it would hold it; None where there was something to report."""
+    """Return the value of a node as the signal would hold it; None if a problem was reported."""
     if signal.type is DataType.STRING:
         text = text_value(node, signal.label, findings, limit=1000)
         if text is None:
@@ -95,7 +95,7 @@ def value_for(node: Node, signal: Signal, findings: ProblemList) -> Value | None
 
 
 def time_of(node: Node, what: str, findings: ProblemList) -> int | None:
-    """Return a time in seconds as ns, exactly as it is written."""
+    """Return a time in seconds as ns, exactly as written."""
     if not is_plain_word(node):
         wrong_kind(node, what, "a time in seconds", findings, number_hint(node))
         return None

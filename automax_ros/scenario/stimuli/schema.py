@@ -1,4 +1,4 @@
-"""The JSON schema of a stimuli file, for editors: an entry's form. Names are the rack's, which no schema knows."""
+"""The JSON schema of a stimuli file, for editors: the form of entries. It does not know the rack's names."""
 
 from __future__ import annotations
 
@@ -127,4 +127,4 @@ VERB_SCHEMAS: Keys = {
         },
     ),
 }
-"""What each verb takes."""
+"""The values that each verb accepts."""

@@ -1,4 +1,4 @@
-"""What stimuli can write: single values by name, of a rack or of a lone task."""
+"""Signals of stimuli: single values by name, of a rack or of a lone task."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 
 @dataclass(frozen=True)
 class Signal:
-    """A simple variable or an element of an array, with how to read and how to write it.
+    """A simple variable or an element of an array, with functions that read and write it.
 
     ``label`` is its full name; ``length`` is the most characters of a STRING; ``low`` and ``high`` are the limits of a
-    number. ``set`` and ``write`` take a value of its type within them. ``set`` is what a person does: it raises
-    OperationRefused where it cannot be done now. ``write`` is what an instrument does: a force makes it do nothing.
+    number. ``set`` and ``write`` accept a value of its type within them. ``set`` acts as an operator: it raises
+    OperationRefused if that is not possible now. ``write`` acts as an instrument: on a forced signal it does nothing.
     """
 
     label: str
@@ -37,13 +37,13 @@ class Signal:
 
 
 class Signals(Protocol):
-    """Finds signals by name. ``word`` says whose they are: ``rack`` or ``task``."""
+    """Finds signals by name. ``word`` is their owner in messages: ``rack`` or ``task``."""
 
     @property
     def word(self) -> str: ...  # noqa: D102
 
     def find(self, name: str) -> Signal:
-        """Return what a name such as ``REF%`` or ``TABLE%(3)`` means.
+        """Return the signal with a name such as ``REF%`` or ``TABLE%(3)``.
 
         Raises:
             NameFault: there is no such simple variable or element, or stimuli may not write it.
@@ -59,7 +59,7 @@ class RackSignals:
     word = "rack"
 
     def find(self, name: str) -> Signal:
-        """Return a common, or an element of one; what the rack itself writes is refused (2.4.6)."""
+        """Return a common, or an element of one; variables that the rack itself writes are refused (2.4.6)."""
         meant = common_named(self.rack.config, name)
         if meant.name in PREDEFINED:
             raise NameFault(f"{meant.name} cannot be written: the rack itself writes it", "leave it out")
@@ -80,14 +80,14 @@ class RackSignals:
         )
 
     def _write(self, meant: CommonElement, view: int, value: Value) -> None:
-        """Write a sample; without power the rack takes none but for inputs, which are the process's (decision)."""
+        """Write a sample; without power the rack ignores all but inputs, which are the process's (decision)."""
         if not self.rack.operations.powered and not self.rack.config.is_input(meant.variable):
             return
         self.rack.write_view(view, [(meant.index, value)], OPERATOR_WRITER)
 
 
 def local_signal(rack: Rack, meant: LocalElement) -> Signal:
-    """Return a simple local of a task, which can be set in no way but by a force."""
+    """Return a simple local of a task, which can be set only by a force."""
     kind = meant.symbol.type
     force = partial(rack.adjust.force, meant.label)
     return Signal(meant.label, kind, 0, *kind.range, partial(_present, meant), force, force)

@@ -1,4 +1,4 @@
-"""What stimuli are made of and what they act on: entries of a file, their actions, the waves that drive signals."""
+"""Stimuli: the entries of a file, their actions, and the waves that drive signals."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from automax_ros.scenario.stimuli.waves import SAMPLE_NS, Wave
 
 
 class Action(Protocol):
-    """One thing that an entry does. ``of`` is what it concerns: a variable, a task, a slot; "" for the whole rack."""
+    """One action of an entry. ``of`` is its variable, task or slot; "" for the whole rack."""
 
     @property
     def of(self) -> str: ...  # noqa: D102
 
     def do(self, stage: WavePlayer, /) -> None:
-        """Do it, at the scheduler's present.
+        """Execute it, at the scheduler's present time.
 
         Raises:
-            OperationRefused: it cannot be done now; the text says why.
+            OperationRefused: it is not possible now; the text says why.
         """
         ...
 
 
 @dataclass(frozen=True)
 class Stimulus:
-    """An entry of a stimuli file: at a rack time, a verb with its actions. ``line`` is where it stands.
+    """An entry of a stimuli file: at a rack time, a verb with its actions. ``line`` is its line in the file.
 
     ``is_value`` is TRUE for verbs that only write values, as the process does; the others operate the rack.
-    ``everywhere`` is TRUE where it writes the same in every process of a distributed rack.
+    ``everywhere`` is TRUE if it writes the same in every process of a distributed rack.
     """
 
     at_ns: int
@@ -44,13 +44,13 @@ class Stimulus:
 
 
 class WavePlayer:
-    """Time, and the waves that drive signals: at most one each, the latest.
+    """Plays waves on signals by rack time: at most one on each, the latest.
 
     ``is_sampling`` is TRUE while a wave writes a value.
     """
 
     def __init__(self, scheduler: Scheduler) -> None:
-        """Take whose time it is."""
+        """Create a player on a scheduler's time."""
         self.scheduler = scheduler
         self.is_sampling = False
         self._driven: dict[str, list[ScheduledEvent]] = {}
@@ -71,9 +71,9 @@ class WavePlayer:
         signal.set(value)
 
     def drive(self, signal: Signal, wave: Wave) -> None:
-        """Let a wave drive a signal from now on, in place of one that does.
+        """Drive a signal with a wave from now on, in place of an earlier wave.
 
-        A sample is written where it differs from what is there, so a task that writes the signal does not keep it.
+        A sample is written if it differs from the present value, so a write by a task does not last.
         """
         self.rest(signal)
         scheduler = self.scheduler
@@ -97,7 +97,7 @@ class WavePlayer:
         self._driven[signal.label] = events
 
     def rest(self, signal: Signal) -> None:
-        """End the wave that drives a signal, if one does; its value stays."""
+        """End the wave that drives a signal, if any; the signal's value stays."""
         for event in self._driven.pop(signal.label, ()):
             event.cancel()
 
@@ -110,20 +110,20 @@ class WavePlayer:
                 self.is_sampling = False
 
     def _key(self) -> EventKey:
-        """Return the place of an event's samples: what began first comes first."""
+        """Return the place of a wave's samples: waves that started earlier come first."""
         self._count += 1
         return EventKey(EventClass.OUTSIDE, _BEGUN, f"{self._count:09d}")
 
 
 _BEGUN = 0
-"""Priority, among what comes from outside at one instant, of what earlier entries began: samples of waves."""
+"""Priority, among outside events of one instant, of samples of waves that earlier entries started."""
 ENTRIES = 1
 """Priority of entries: after what earlier entries began (decision), before all else."""
 
 
 @dataclass(frozen=True)
 class OperationRecord:
-    """What came of an action: ``what`` is the verb, ``why`` says why it was refused where ``ok`` is FALSE."""
+    """Result of an action: ``what`` is the verb, ``why`` the reason of a refusal, if ``ok`` is FALSE."""
 
     at_ns: int
     what: str

@@ -1,4 +1,4 @@
-"""The verbs that write values, as the process does: set, ramp, sine, square. A rack has them, and a task alone."""
+"""The verbs that write values, as the process does: set, ramp, sine, square. For a rack and for a lone task."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class SetValue:
 
 @dataclass(frozen=True)
 class DriveSignal:
-    """Lets a wave drive a signal."""
+    """Drives a signal with a wave."""
 
     signal: Signal
     wave: Wave
@@ -51,12 +51,12 @@ class DriveSignal:
         return self.signal.label
 
     def do(self, stage: WavePlayer) -> None:
-        """Begin."""
+        """Start the wave."""
         stage.drive(self.signal, self.wave)
 
 
 def goes_on_for_ever(stimuli: Iterable[Stimulus]) -> bool:
-    """Return whether one of the entries begins a wave without an end."""
+    """Return whether one of the entries starts a wave without an end."""
     actions = (action for entry in stimuli for action in entry.actions)
     return any(isinstance(action, DriveSignal) and action.wave.for_ns is None for action in actions)
 
@@ -83,7 +83,7 @@ def value_verbs(signals: Signals) -> Mapping[str, Verb]:
 
 @dataclass(frozen=True)
 class _Shape:
-    """What stands after a signal's name: keys of a wave, at a place, called ``what`` in messages."""
+    """The node after a signal's name: keys of a wave, at a place, called ``what`` in messages."""
 
     signal: Signal
     section: Section
@@ -169,7 +169,7 @@ def _sine(shape: _Shape) -> Sine | None:
 
 
 def _square(shape: _Shape) -> Square | None:
-    """Read a square; a BOOLEAN goes between FALSE and TRUE where the file gives no levels."""
+    """Read a square; a BOOLEAN alternates between FALSE and TRUE if the file gives no levels."""
     kind = shape.signal.type
     if kind is DataType.STRING:
         shape.findings.add("AMX6737", f"{shape.what} needs two levels; a STRING has none", shape.span)

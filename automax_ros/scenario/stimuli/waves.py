@@ -1,4 +1,4 @@
-"""The shapes that stimuli give a signal over time: ramp, sine, square. Pure functions of the time since their start.
+"""Shapes of signals over time: ramp, sine, square. Pure functions of the time since their start.
 
 All are sampled at their start and each ms after it (decision: the contract says 1 ms for ramps). A ramp also has a
 sample at its end; a sine and a square end before theirs, so that a square of whole periods leaves its low value.
@@ -22,17 +22,17 @@ MOST_HZ = 500
 
 
 class Wave(Protocol):
-    """A shape. ``for_ns`` is how long it lasts, None where it has no end."""
+    """A shape. ``for_ns`` is its duration, None if it has no end."""
 
     @property
     def for_ns(self) -> int | None: ...  # noqa: D102
 
     def value(self, elapsed_ns: int, start: Value, /) -> Value:
-        """Return the value some time after the start, where the signal had the value ``start``."""
+        """Return the value at ``elapsed_ns`` after the start, at which the signal had the value ``start``."""
         ...
 
     def last(self) -> Value | None:
-        """Return the value at the very end, None where the last sample stays."""
+        """Return the value at the very end, None if the last sample stays."""
         ...
 
 
@@ -76,13 +76,13 @@ class Sine:
         return math.floor(exact + 0.5) if self.type.is_integer else stored_real(exact)[0]
 
     def last(self) -> Value | None:
-        """Leave the last sample."""
+        """Return None: the last sample stays."""
         return None
 
 
 @dataclass(frozen=True)
 class Square:
-    """Half a period ``high``, half a period ``low``, beginning with ``high``."""
+    """Half a period ``high``, half a period ``low``, starting with ``high``."""
 
     low: Value
     high: Value
@@ -95,5 +95,5 @@ class Square:
         return self.low if half_periods % 2 else self.high
 
     def last(self) -> Value | None:
-        """Leave the last sample."""
+        """Return None: the last sample stays."""
         return None
