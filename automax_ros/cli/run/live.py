@@ -90,7 +90,7 @@ class LiveSession:
         """Put the rack into RUN for the first time; FALSE where a stop is requested first.
 
         Raises:
-            SeatTaken: another process of a distributed run has the same modules.
+            ProcessAlreadyRuns: another process of a distributed run has the same modules.
         """
         self._ending.callback(sys.setswitchinterval, sys.getswitchinterval())
         sys.setswitchinterval(SWITCH_S)
