@@ -1,6 +1,6 @@
-"""Signals before a command has begun its work: nothing is open yet, so they end the program at once and in silence.
+"""Signals before a command has begun its work: nothing is open yet, so they end the program at once and silently.
 
-An import that is interrupted by an exception shows it. Only what every Python has loaded is imported here.
+An exception that interrupts an import would be printed. Only modules that Python has loaded anyway are imported here.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ _NUMBERS = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP)
 
 
 def end_at_once(number: int, _: object) -> None:
-    """End the program with the exit code that the shell gives a signal."""
+    """End the program with the shell's exit code for a signal."""
     os._exit(_SIGNALLED + number)
 
 
 def end_well(_: int, __: object) -> None:
-    """End a program that runs until it is stopped."""
+    """End a program that runs until it is stopped, with exit code 0."""
     os._exit(0)
 
 
@@ -26,7 +26,7 @@ EARLY = (end_at_once, end_well)
 
 
 def until_work_begins(*, ends_well: bool) -> None:
-    """Let SIGINT, SIGTERM and SIGHUP end the program at once; one that is ignored stays so.
+    """Make SIGINT, SIGTERM and SIGHUP end the program at once; one that is ignored stays ignored.
 
     ``ends_well``: with exit code 0, since to be stopped is its end (decision: launch files and supervisors take another
     code for a failure, and the person cannot know how far the program has come).
@@ -37,12 +37,12 @@ def until_work_begins(*, ends_well: bool) -> None:
 
 
 def work_begins() -> None:
-    """Let Ctrl-C be an exception again, so that a command cleans up; nothing changes without ``until_work_begins``."""
+    """Make Ctrl-C raise an exception again, so that a command cleans up; no effect without ``until_work_begins``."""
     if _signal.getsignal(_signal.SIGINT) in EARLY:
         _signal.signal(_signal.SIGINT, _signal.default_int_handler)
 
 
 def work_has_ended() -> None:
-    """Let no signal change the end any more: the exit code stands."""
+    """Ignore signals from here on; the exit code is final."""
     for number in _NUMBERS:
         _signal.signal(number, _signal.SIG_IGN)

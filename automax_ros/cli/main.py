@@ -1,6 +1,6 @@
-"""The command line `automax`: finds the subcommand, runs it, and turns what goes wrong into exit codes.
+"""The command line `automax`: finds the subcommand, runs it, and turns errors into exit codes.
 
-At the top stands only what every Python has loaded already: what is imported later may be interrupted by signals.
+The top imports only modules that Python has loaded anyway: while later imports run, signals are already handled.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ SUBCOMMANDS: dict[str, str] = {
     "completion": "what makes a shell complete this command line",
     "explain": "say what a problem code means and how to cure it",
 }
-"""Every subcommand and its line of help; its module is imported when it is asked for."""
+"""Every subcommand and its line of help; its module is imported only when it is used."""
 _FOLDERS = {
     "tasks": ("check", "trace", "compile", "tune-info", "response", "convert", "compare", "blocks", "explain"),
     "racks": ("sweep", "load", "drive-check", "new", "import", "step", "bridge", "security-policy", "schema"),
@@ -64,17 +64,17 @@ _FOLDERS = {
 """The folder of each subcommand's module."""
 
 ROS_ARGUMENTS = "--ros-args"
-"""What the ROS arguments of a command line begin with."""
+"""The argument that introduces the ROS arguments of a command line."""
 UNTIL_STOPPED = ("run", "node", "record", "play")
-"""The subcommands that go on until somebody stops them."""
+"""The subcommands that run until they are stopped."""
 INTERRUPTED = 130
-"""Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""
+"""Exit code after Ctrl-C: 128 + SIGINT, as in the shell."""
 BROKEN_PIPE = 141
-"""Exit code where whoever reads our output has gone: 128 + SIGPIPE."""
+"""Exit code when the reader of the output has closed its pipe: 128 + SIGPIPE."""
 
 
 def entry() -> NoReturn:
-    """Run `automax` as the program of this process: once the exit code stands, no signal changes it any more."""
+    """Run `automax` as the program of this process; once the exit code is final, no signal changes it any more."""
     early.until_work_begins(ends_well=_until_stopped(sys.argv[1:]))
     code = main()
     try:
@@ -107,7 +107,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"automax: error: {what}: {error.strerror or error}", file=sys.stderr)
         return 2
     finally:
-        if argv is not None:  # else it is the process's output, a traceback of Python's included
+        if argv is not None:  # else it stays for the process's further output, including a traceback
             output.undo()
     return code
 
@@ -147,17 +147,17 @@ def _name(words: Sequence[str]) -> str | None:
 
 
 def _interrupted(words: Sequence[str]) -> int:
-    """Return the exit code after Ctrl-C that came before the command takes signals itself, as ``early`` has it."""
+    """Return the exit code after a Ctrl-C before the command handles signals itself: the same as in ``early``."""
     return 0 if _until_stopped(words) else INTERRUPTED
 
 
 def _until_stopped(words: Sequence[str]) -> bool:
-    """Whether the command goes on until somebody stops it; a simulated run without ROS has work to do first."""
+    """Whether the command runs until it is stopped; a simulated run without ROS has work to finish."""
     return _name(words) in UNTIL_STOPPED and ("--simulated" not in words or "--ros" in words)
 
 
 def _split(argv: list[str]) -> tuple[list[str], RosArguments | None]:
-    """Return the command line without its ROS arguments, and these where there are any."""
+    """Return the command line without its ROS arguments, and the ROS arguments, None if there are none."""
     if ROS_ARGUMENTS not in argv:
         return argv, None
     from automax_ros.ros.setup.arguments import split_arguments
@@ -166,10 +166,10 @@ def _split(argv: list[str]) -> tuple[list[str], RosArguments | None]:
 
 
 def _hand_over(ros: RosArguments | None, arguments: argparse.Namespace) -> None:
-    """Give a subcommand its ROS arguments.
+    """Pass the ROS arguments to a subcommand.
 
-    One that makes no nodes refuses them: they would have no effect. Launch files always pass ``--ros-args``, which
-    alone is allowed (decision).
+    A subcommand that creates no nodes refuses them: they would have no effect. Launch files always pass
+    ``--ros-args``, which alone is allowed (decision).
     """
     if ros is None:
         return
@@ -184,18 +184,18 @@ def _hand_over(ros: RosArguments | None, arguments: argparse.Namespace) -> None:
 def parsers(
     modules: Mapping[str, ModuleType],
 ) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
-    """Return the parser of the whole command line and those of its subcommands; ``modules`` know their arguments."""
+    """Return the parser of the whole command line and those of its subcommands; ``modules`` add their arguments."""
     import argparse
 
     class WideHelp(argparse.HelpFormatter):
-        """Leaves room for the longest subcommand: argparse forgets that they are indented twice."""
+        """Leaves room for the longest subcommand: argparse ignores that they are indented twice."""
 
         def add_argument(self, action: argparse.Action) -> None:
             super().add_argument(action)
             self._action_max_length = max(self._action_max_length, max(map(len, SUBCOMMANDS)) + 4)
 
     class ShowVersion(argparse.Action):
-        """Prints the version and what runs, which takes reading sources: only where it was asked for."""
+        """Prints the version and whether compiled modules run; on request only, since it reads all sources."""
 
         def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
             print("\n".join(version_lines()))
@@ -210,7 +210,7 @@ def parsers(
     for name, text in SUBCOMMANDS.items():
         own = modules.get(name)
         if modules and own is None:
-            continue  # a parser takes time, and nobody will ask for it
+            continue  # building a parser takes time, and this one will not be used
         found[name] = subcommands.add_parser(
             name,
             help=text,
@@ -223,7 +223,7 @@ def parsers(
 
 
 def version_lines() -> list[str]:
-    """Return the version, and whether modules that were compiled ahead of time run or plain Python."""
+    """Return the version, and whether modules compiled ahead of time or plain Python modules run."""
     import automax_ros
     from automax_ros.core.compiled import describe
 
@@ -231,9 +231,9 @@ def version_lines() -> list[str]:
 
 
 def module_of(name: str) -> ModuleType:
-    """Return the module of a subcommand; its ``add_arguments`` and ``run`` are all there is to it.
+    """Return the module of a subcommand, which has the functions ``add_arguments`` and ``run``.
 
-    A dash in the subcommand's name is an underscore in the module's; a word of Python has one at its end.
+    A dash in the subcommand's name is an underscore in the module's; a keyword of Python gets one appended.
     """
     import importlib
     import keyword
@@ -256,7 +256,7 @@ def _exit_code(code: object) -> int:
 
 
 def _open_closed_streams() -> None:
-    """Put /dev/null where the caller has closed a standard stream: Python has None there, and files take its number."""
+    """Open /dev/null for each standard stream that the caller closed: Python has None there, files take its number."""
     for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         if getattr(sys, name) is None:
             nowhere = os.open(os.devnull, os.O_RDWR)
@@ -267,7 +267,7 @@ def _open_closed_streams() -> None:
 
 
 def _accept_every_character() -> None:
-    """Let no file name or text stop the program because the terminal's encoding lacks a character."""
+    """Escape characters that the terminal's encoding lacks, so that no file name or text stops the program."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -280,7 +280,7 @@ def _make_output_visible() -> VisibleOutput:
 
 
 def _discard_output() -> None:
-    """Point standard output nowhere, so that Python's own flush at the end does not complain again."""
+    """Redirect standard output to /dev/null, so that Python's flush at exit does not fail again."""
     try:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())

@@ -1,4 +1,4 @@
-"""What is wrong with how the command was used."""
+"""The error for wrong usage of a command."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from automax_ros.core.faults import UserError
 
 
 class UsageError(UserError):
-    """The command cannot do what it was told: wrong arguments, or an unreadable file; exit code 2."""
+    """The command cannot do what was asked: wrong arguments, or an unreadable file; exit code 2."""

@@ -1,8 +1,8 @@
-"""The one place through which `automax` prints: no control character of what it prints reaches the terminal.
+"""The streams through which `automax` prints: control characters in printed text do not reach the terminal.
 
-File names, a rack's answers, a person's arguments and what other programs said are printed as they come; here their
-control characters are made visible (``core.text.visible``). What this program itself tells the terminal, a colour or
-to write a line again, goes through ``write_control``.
+File names, a rack's answers, the user's arguments and the output of other programs are printed unchecked; these streams
+make their control characters visible (``core.text.visible``). Control sequences of this program itself, for colours or
+to rewrite a line, go through ``write_control``.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 class VisibleStream:
-    """A text stream that passes on what is written with its control characters made visible."""
+    """A text stream that makes control characters visible in text written to it."""
 
     def __init__(self, stream: TextIO) -> None:
-        """Stand in front of a stream: all else about it is the stream's own."""
+        """Wrap a stream, which keeps all its other attributes."""
         self._stream = stream
 
     def write(self, text: str) -> int:
@@ -45,17 +45,17 @@ class VisibleOutput:
     """Standard output and standard error of this process, made visible until ``undo``."""
 
     def __init__(self) -> None:
-        """Begin; streams that are visible already stay as they are."""
+        """Replace the streams; those that are visible already stay as they are."""
         self._before = sys.stdout, sys.stderr
         sys.stdout, sys.stderr = _seen(sys.stdout), _seen(sys.stderr)
 
     def undo(self) -> None:
-        """Put the streams back that were there before."""
+        """Restore the previous streams."""
         sys.stdout, sys.stderr = self._before
 
 
 def write_control(stream: TextIO, text: str) -> None:
-    """Write a text of this program's own with its control sequences, and of others' only what is visible already."""
+    """Write a text with this program's control sequences; text from elsewhere in it must have been made visible."""
     if isinstance(stream, VisibleStream):
         stream.write_control(text)
     else:

@@ -1,1 +1,1 @@
-"""Recorded scans executed again and compared: with the recorded sources, or with edited ones."""
+"""Replay: recorded scans are executed again, with the recorded or with edited sources, and compared."""

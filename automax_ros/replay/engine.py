@@ -1,7 +1,7 @@
 """Replay: executes every recorded scan again and compares, with the recorded sources or with edited ones.
 
-It is an open loop. Each task gets the inputs that were recorded, whatever the other tasks do in the replay; only what a
-task wrote itself it finds again as it wrote it. Nothing is needed but the recording, and nothing of ROS.
+It is an open loop. Each task gets the recorded inputs, whatever the other tasks do in the replay; only its own writes
+it reads back as written in the replay. Only the recording is needed, and nothing of ROS.
 
 report = replay(Path("out"), {"SPEED": read_task_source(Path("new/SPEED.BLK"))})
 report.identical
@@ -44,26 +44,26 @@ from automax_ros.replay.scans.task import TaskReplay
 from automax_ros.replay.scans.totals import Totals
 
 DEFAULT_MAX_DIFFERENCES = 50
-"""Most differences that a replay's report tells in full, unless said otherwise (decision)."""
+"""Default for the most differences that a replay's report lists in full (decision)."""
 LONGEST_WAIT_NS = NS_PER_S
-"""How long after the end of the range a scan is waited for that began in it: modeled ones last (decision)."""
+"""Longest wait after the end of the range for a scan that began in it: modeled ones last (decision)."""
 _KINDS = (CommonImage, CommonWrite, Operation, Scan, TaskState, VariableTable)
 _TYPES = frozenset(NAMES[kind] for kind in _KINDS)
 _STATES = frozenset({"automax_msgs/msg/TaskState"})
 
 Stored = tuple[StoredRack, RunFacts]
-"""What a recording stores of its rack, and what describes its run."""
+"""The rack stored in a recording, and the facts of its run."""
 Watcher = Callable[[TaskReplay, Scan], None]
-"""Called after each scan that was executed again."""
+"""Called after each replayed scan."""
 
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """What to replay: tasks (``only``, None: all), the range in ns since the start of the run, both ends included.
+    """Options of a replay: tasks (``only``, None: all), the range in ns since the start of the run, both ends included.
 
-    Numbers that differ by at most ``tolerance`` count as equal; ``max_differences`` are told in full.
+    Numbers that differ by at most ``tolerance`` count as equal; at most ``max_differences`` are listed in full.
 
-    ``by_columns``: where scans are uniform, thousands are executed, as ``native`` says, and compared at once. The
+    ``by_columns``: where scans are uniform, thousands are executed at once, as ``native`` says, and compared. The
     report is the same either way, so only the library has this option (decision): the tests prove it.
     """
 
@@ -82,24 +82,25 @@ def replay(
     options: ReplayOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> ReplayReport:
-    """Replay a recording; ``new`` are sources that run in place of the recorded ones, by the name of their task.
+    """Replay a recording; ``new`` are sources that run in place of the recorded ones, by task name.
 
-    ``on_progress`` is called now and then with the share that is done, 0 to 1. Memory does not grow with the recording.
+    ``on_progress`` is called from time to time with the share that is done, 0 to 1. Memory use does not grow with the
+    recording.
 
     Raises:
-        BagError: the recording cannot be read, or does not hold what the replay needs.
+        BagError: the recording cannot be read, or lacks something that the replay needs.
         SourceRefused: a source has errors.
     """
     return Replay(bag, new or {}, options or ReplayOptions()).run(on_progress)
 
 
 class Replay:
-    """One recording, ready to be executed again any number of times."""
+    """One recording, prepared for any number of replays."""
 
     def __init__(
         self, bag: Path, new: Mapping[str, SourceText], options: ReplayOptions, stored: Stored | None = None
     ) -> None:
-        """Check and compile the tasks; ``stored`` is what was read of the recording before.
+        """Check and compile the tasks; ``stored`` is the rack and run if they were read before.
 
         Raises:
             BagError: the recording cannot be read, or lacks a task or its source.
@@ -118,13 +119,13 @@ class Replay:
 
     @property
     def native(self) -> list[str]:
-        """What became of the tasks that were executed by columns, here and elsewhere: native, or why they are not."""
+        """Whether the tasks executed by columns were native, or why not, in words; here and in other processes."""
         own = (outcome.text for outcome in self._forms.outcomes)
         return list(dict.fromkeys((*self.native_elsewhere, *own)))
 
     @property
     def warnings(self) -> list[tuple[SourceText, list[Diagnostic]]]:
-        """What the check of the new sources found, short of errors."""
+        """The warnings of the new sources."""
         return [(item.source, list(item.warnings)) for item in self.sources if item.edited and item.warnings]
 
     def run(
@@ -136,7 +137,7 @@ class Replay:
         """Execute and compare; ``to_ns`` ends it earlier than the options say.
 
         Raises:
-            BagError: the recording cannot be read to its end, or does not hold what the replay needs.
+            BagError: the recording cannot be read to its end, or lacks something that the replay needs.
         """
         reader = self.reader.again()
         options = self.options if to_ns is None else replace(self.options, to_ns=to_ns)
@@ -154,15 +155,15 @@ class Replay:
         return self.report(run.totals(), options)
 
     def starts(self, reader: BagReader, options: ReplayOptions) -> Mapping[str, int]:
-        """Return the log time of the state with which each task begins, where the range begins later than the run."""
+        """Return the log time of the state with which each task begins, empty if the range begins with the run."""
         return _last_states(reader, self.facts.table.stamp + options.from_ns) if options.from_ns else {}
 
     def begin(self, starts: Mapping[str, int], options: ReplayOptions, watcher: Watcher | None = None) -> Run:
-        """Return a pass over the recording, or over files of it, that has taken nothing yet."""
+        """Return a new pass over the recording, or over files of it."""
         return Run(self.bag, self.rack, self.facts, self.sources, options, starts, watcher, self._forms)
 
     def report(self, totals: Totals, options: ReplayOptions) -> ReplayReport:
-        """Return what was found.
+        """Return the report of totals.
 
         Raises:
             BagError: there was nothing to compare.
@@ -187,7 +188,7 @@ class Replay:
         return report
 
     def _require_compared(self, report: ReplayReport, options: ReplayOptions) -> None:
-        """Refuse to call the recording, or a task that was asked for, the same when none of its scans was executed."""
+        """Refuse to report a recording or a requested task as identical if none of its scans was executed."""
         nothing = not report.scans and report.identical
         names = tuple(task.name for task in report.tasks)
         if nothing and (options.from_ns or options.to_ns is not None):
@@ -205,7 +206,7 @@ class Replay:
 
 
 class Run:
-    """One pass over a recording, or over files of it."""
+    """One pass of a replay over a recording, or over files of it."""
 
     def __init__(
         self,
@@ -242,7 +243,7 @@ class Run:
                 self._writers[writers[source.name]] = task
 
     def take_all(self, reader: BagReader) -> bool:
-        """Take the messages of a recording, up to the end of the range; return whether that has not come."""
+        """Process the messages of a recording up to the end of the range; return FALSE if that was reached."""
         if self._watcher is not None or not self._options.by_columns:
             return all(map(self.take, reader.messages(types=_TYPES)))
         names = self._all_tasks
@@ -258,7 +259,7 @@ class Run:
         return blocks.take(item)
 
     def take_up_to_scan(self, reader: BagReader) -> bool:
-        """Take the messages before the first scan of any task; return whether the range has not ended among them."""
+        """Process the messages before the first scan of any task; return FALSE if the range ends among them."""
         for entry in reader.messages(types=_TYPES):
             if isinstance(entry.message, Scan):
                 return True
@@ -267,15 +268,15 @@ class Run:
         return True
 
     def ends_in_doubt(self) -> list[TaskReplay]:
-        """Return the edited tasks that may end where the recorded ones do not, or the other way round."""
+        """Return the edited tasks that may have ended where the recorded ones did not, or the other way round."""
         return [task for task in self._tasks.values() if task.end_in_doubt]
 
     def stopped_in(self, name: str) -> int | None:
-        """Return the last recorded scan of a task, if it stopped in it by itself."""
+        """Return the last scan of a task if it stopped in it by itself, else None."""
         return self._tasks[name].stopped_in
 
     def take(self, entry: BagMessage) -> bool:
-        """Take one message; return whether there may be more of interest."""
+        """Process one message; return whether later ones may still be in the range."""
         message = entry.message
         if self._first_stamp is None:
             self._first_stamp = entry.stamp
@@ -299,25 +300,25 @@ class Run:
         return True
 
     def totals(self) -> Totals:
-        """Return what was found so far."""
+        """Return the totals so far."""
         tasks = {name: task.totals() for name, task in self._tasks.items()}
         found = self._tallies
         return Totals(self._first_stamp, self._last_stamp, tasks, found.first(), found.differences(), found.more)
 
     def carried(self) -> CarriedState:
-        """Return what of all that it has taken decides on what is to come."""
+        """Return the state after the messages so far that determines the further replay."""
         tasks = {name: task.carried for name, task in self._tasks.items()}
         stopped = frozenset(name for name, task in self._tasks.items() if task.stopped)
         return CarriedState(digest((self._commons.carried, tasks)), stopped, self._commons.knows_no_force)
 
     @property
     def beginnings(self) -> dict[str, PartStart]:
-        """What each task has asked of the time before, by its name."""
+        """The information that each task needed from before the first message, by task name."""
         return {name: task.beginning for name, task in self._tasks.items()}
 
     @property
     def asked_back(self) -> bool:
-        """Whether it has asked for forces that held before its first message."""
+        """Whether forces before the first message were needed."""
         return self._commons.asked_back
 
     def _take_scan(self, scan: Scan) -> bool:
@@ -350,7 +351,7 @@ class Run:
 
 
 def _stored(reader: BagReader) -> Stored:
-    """Read what a recording stores. BagError, SourceRefused: as ``Replay``."""
+    """Read the rack and the run of a recording. BagError, SourceRefused: as ``Replay``."""
     rack, facts = stored_rack(reader), run_facts(reader)
     require_tasks(reader.path, facts.table)
     rack.check_table(facts.table)
@@ -363,7 +364,7 @@ def _last_states(reader: BagReader, latest: int) -> dict[str, int]:
     for entry in reader.messages(types=_STATES):
         message = entry.message
         if isinstance(message, TaskState):
-            if message.stamp >= latest:  # a state of that very instant may contain the scan of the instant
+            if message.stamp >= latest:  # a state of that instant may include the scan of the instant
                 break
             found[message.task] = entry.log_time
     return found

@@ -1,4 +1,4 @@
-"""One part of a recording, some of its files, executed again by itself: what a process of many does."""
+"""Replay of one part of a recording, some of its files, as the work of one of many processes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from automax_ros.replay.scans.carried_state import CarriedState
 from automax_ros.replay.scans.totals import Totals
 
 _AT_HAND: WeakValueDictionary[bytes, Replay] = WeakValueDictionary()
-"""Replays that were packed here: a copy of this process has them ready, with their tasks compiled."""
+"""Replays packed in this process; a fork of the process has them with their tasks compiled."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +28,13 @@ class Part:
 
 @dataclass(frozen=True)
 class PartResult:
-    """What came of a part, up to the first scan that follows on it.
+    """The result of a part, up to the first scan after it.
 
-    ``entry`` and ``exit`` are what is carried at its first scan and at that one, ``totals`` what was counted between.
-    ``went_on``: tasks whose first scan is not their start; ``scanned``: those that have scanned. ``unsure``: it may
-    not be what follows on the part before, whatever that is. ``ended``: the range of the replay ends in it.
-    ``native`` is what ``Replay.native`` tells of it.
-    ``doubtful``: were this the end, an edited task might have ended otherwise than the recorded one.
+    ``entry`` and ``exit`` are the states carried at its first scan and at the one after it, ``totals`` the counts
+    between. ``went_on``: tasks whose first scan is not their start; ``scanned``: those that have scanned.
+    ``asked_back``: forces before its first message were needed. ``unsure``: it may not be a continuation of the part
+    before, whatever that is. ``ended``: the range of the replay ends in it. ``doubtful``: if this is the end, an
+    edited task may have ended differently from the recorded one. ``native`` is ``Replay.native`` of the part.
     """
 
     entry: CarriedState
@@ -50,12 +50,12 @@ class PartResult:
 
     @property
     def clean(self) -> bool:
-        """Whether nothing differs, and all is told."""
+        """Whether nothing differs, and no note was dropped."""
         return self.totals.clean and not self.totals.full
 
 
 def packed(replay: Replay) -> bytes:
-    """Return a replay as it is handed to other processes."""
+    """Return a replay in the serialized form for other processes."""
     bag = replay.bag.resolve()
     what = pickle.dumps((bag, dict(replay.new), replay.options, (replay.rack, replay.facts)))
     _AT_HAND[what] = replay
@@ -63,10 +63,10 @@ def packed(replay: Replay) -> bytes:
 
 
 def replay_part(what: bytes, part: Part) -> PartResult:
-    """Execute a part again, by itself.
+    """Execute a part again, independently of the others.
 
     Raises:
-        BagError: it cannot be read, or does not hold what the replay needs.
+        BagError: it cannot be read, or lacks something that the replay needs.
     """
     replay = _AT_HAND.get(what) or _unpacked(what)
     files = len(replay.reader.files)
@@ -94,7 +94,7 @@ def replay_part(what: bytes, part: Part) -> PartResult:
 
 
 def begun(replay: Replay, first: int) -> tuple[Totals, CarriedState]:
-    """Return what a pass that begins with a file has counted before the first scan, and what it carries there."""
+    """Return the totals before the first scan of a pass that begins with a file, and the state carried there."""
     run = replay.begin({}, replay.options)
     if first:
         run.take_up_to_scan(replay.reader.part(first, len(replay.reader.files)))
@@ -109,12 +109,12 @@ def scanning(run: Run, counted: Totals) -> tuple[frozenset[str], frozenset[str]]
 
 
 def is_unsure(run: Run) -> bool:
-    """Return whether a pass that has begun with a file has asked for what only the files before could tell."""
+    """Return whether a pass that began with a file needed information that only earlier files have."""
     return any(beginning.unsure for beginning in run.beginnings.values())
 
 
 def _run(replay: Replay, part: Part) -> Run:
-    """Return the pass over a part: the first one begins where the range does."""
+    """Return the pass over a part; that of the first part begins with the range."""
     starts: Mapping[str, int] = {}
     if not part.first:
         starts = replay.starts(replay.reader.part(0, part.end), replay.options)
@@ -122,13 +122,13 @@ def _run(replay: Replay, part: Part) -> Run:
 
 
 def _nothing(totals: Totals) -> Totals:
-    """Return totals in which nothing has been told: what the first part notes at its beginning counts."""
+    """Return totals without notes, so that the notes at the beginning of the first part count as its own."""
     return totals.forgetting_notes()
 
 
 @lru_cache(maxsize=1)
 def _unpacked(what: bytes) -> Replay:
-    """Return a replay that was handed over, compiled once for all of its parts."""
+    """Return a replay from its serialized form, compiled once for all of its parts."""
     bag, new, options, stored = pickle.loads(what)
     assert isinstance(bag, Path)
     assert isinstance(options, ReplayOptions)

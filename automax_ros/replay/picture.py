@@ -1,4 +1,4 @@
-"""The picture of a first divergence: recorded and replayed values of the first variables that differ."""
+"""The picture of the first difference: recorded and replayed values of the first variables that differ."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from automax_ros.replay.scans.report import Difference, Kind, ReplayReport
 from automax_ros.replay.scans.task import TaskReplay
 
 MOST_LANES = 5
-"""Most variables that one picture shows (decision): more cannot be told apart."""
+"""Most variables in one picture (decision): more cannot be told apart."""
 BEFORE_S, AFTER_S = 0.5, 1.5
 """Seconds that a picture shows before and after the first difference (decision) ..."""
 BEFORE_SCANS, AFTER_SCANS = 10, 40
@@ -44,12 +44,12 @@ class Trace:
 
 
 def can_be_drawn(report: ReplayReport) -> bool:
-    """Whether some variable with numbers differs."""
+    """Whether a variable with numbers differs."""
     return bool(_drawable(report))
 
 
 def traces(replay: Replay, report: ReplayReport, on_progress: Callable[[float], None] | None = None) -> list[Trace]:
-    """Execute the recording once more, up to after the first difference, and return what is to be drawn.
+    """Execute the recording once more, to shortly after the first difference, and return the traces to draw.
 
     Raises:
         BagError: the recording cannot be read.
@@ -81,7 +81,7 @@ def traces(replay: Replay, report: ReplayReport, on_progress: Callable[[float], 
 
 
 def draw(found: Sequence[Trace], report: ReplayReport, path: Path) -> None:
-    """Draw the traces, a lane each, with time axis and units.
+    """Draw the traces, each in a separate lane, with time axis and units.
 
     Raises:
         BagError: matplotlib is missing, or the file cannot be written.
@@ -117,7 +117,7 @@ def draw(found: Sequence[Trace], report: ReplayReport, path: Path) -> None:
 
 
 def _plain(text: str) -> str:
-    """A text that is drawn as it stands: no formulas, nothing unprintable."""
+    """Return a text that matplotlib draws literally: no formulas, nothing unprintable."""
     return printable(text).replace("$", r"\$")
 
 
@@ -128,7 +128,7 @@ def _drawable(report: ReplayReport) -> list[Difference]:
 
 
 def _trace(difference: Difference, variables: Sequence[CommonVariable]) -> Trace:
-    """Find the variable, and the element, that a difference names."""
+    """Return an empty trace of the variable, or element, that a difference names."""
     views = {item.name: view for view, item in enumerate(variables)}
     found = element(difference.name, {item.name: item for item in variables}, "the rack has no common variable")
     return Trace(difference, found.variable, (views[found.name], found.index))

@@ -1,8 +1,8 @@
-"""The files of a split recording executed again side by side: by processes of this machine, or by a Dask cluster.
+"""Parallel replay of a split recording's files: by processes of this machine, or by a Dask cluster.
 
-Each part begins with the states that its first file holds, and proves that nothing differs in it; that it begins where
-the part before ends is proven by what both carry there (``joining``). From the first part on of which that cannot be
-said, the replay goes on in one process, as it always does: so the report is that of one job, to the last note.
+Each part begins with the states in its first file, and proves that nothing differs in it. That it continues the part
+before is proven by the equal state that both carry at that place (``carried_state``). From the first part without that
+proof on, the replay continues in one process, so that the report is the same as that of one job, including all notes.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from automax_ros.replay.scans.report import ReplayReport
 from automax_ros.replay.scans.totals import Totals, added_up
 
 LEAST_PART_BYTES = 16 << 20
-"""Files are put together to parts of at least this size (decision: less is executed in a fraction of a second).
+"""Files are combined into parts of at least this size (decision: less is executed in a fraction of a second).
 
-They are handed out in their order: the first one that differs ends the work, and the last is the shortest as a rule.
+They are distributed in their order: the first one that differs ends the work, and the last is usually the shortest.
 """
 ONE_PART = (
     "the recording is replayed here: a cluster is handed parts of at least "
     f"{LEAST_PART_BYTES >> 20} MB, each of one file or more, and this recording makes only one such part"
 )
-"""What is told of a cluster that is not used."""
+"""The note about a cluster that is not used."""
 Progress = Callable[[float], None]
 
 
 def replay_side_by_side(
     replay: Replay, where: Workers, on_progress: Progress | None = None, on_note: Callable[[str], None] = lambda _: None
 ) -> ReplayReport:
-    """Replay a recording; its files side by side where there are several, and where that is worth it.
+    """Replay a recording; its files in parallel if there are several and that is worthwhile.
 
-    ``on_note`` is told where a cluster was named and is not used: one part is executed here (decision).
+    ``on_note`` is called if a cluster was given and is not used: a single part is executed here (decision).
 
     Raises:
-        BagError: the recording cannot be read, or not by a worker of the cluster, or does not hold what is needed.
+        BagError: the recording cannot be read, or not by a worker of the cluster, or lacks something that is needed.
         ClusterFault: the cluster cannot be used.
     """
     parts = [] if where.scheduler is None and where.processes == 1 else parts_of(replay)
@@ -53,7 +53,7 @@ def replay_side_by_side(
 
 
 def parts_of(replay: Replay) -> list[Part]:
-    """Return the parts of a recording that can be executed by themselves: none unless it is of ours."""
+    """Return the parts of a recording that can be executed independently: none unless our recorder made it."""
     reader = replay.reader
     count = len(reader.files)
     if count < 2 or not reader.is_ours:
@@ -62,7 +62,7 @@ def parts_of(replay: Replay) -> list[Part]:
         first, end = _files_in_range(replay, count)
         sizes = [size_of(file) for file in reader.files]
     except BagError:
-        return []  # whoever reads it from its beginning tells
+        return []  # raised again when the recording is read from its beginning
     parts: list[Part] = []
     begin, size = 0, 0
     for number in range(first, end):
@@ -74,7 +74,7 @@ def parts_of(replay: Replay) -> list[Part]:
 
 
 def _files_in_range(replay: Replay, count: int) -> tuple[int, int]:
-    """Return the last file that begins before the range, and the one after that with which it may end."""
+    """Return the number of the last file that begins before the range, and that after the last one of the range."""
     options, start = replay.options, replay.facts.table.stamp
     first, end = 0, count
     if options.from_ns:
@@ -95,10 +95,10 @@ def _first_stamp(replay: Replay, number: int) -> int:
 
 @dataclass(frozen=True)
 class _Proven:
-    """How far the recording is proven to be the same: what was counted, and the part with which to go on.
+    """The proven beginning of the recording: the totals of its parts, and the part with which to continue.
 
-    ``part`` is None where all of it is. ``stopped`` are the tasks that have stopped by themselves before that part,
-    ``knows_no_force`` says that no force had held by then. ``failed`` is the part that has no result.
+    ``part`` is None if the whole recording is proven. ``stopped`` are the tasks that have stopped by themselves before
+    that part, ``knows_no_force``: no force had held by then. ``failed`` is a part without result.
     """
 
     counted: tuple[Totals, ...] = ()
@@ -108,19 +108,19 @@ class _Proven:
     failed: int | None = None
 
     def follows(self, exit: CarriedState, result: PartResult) -> bool:
-        """Whether a part is what follows on one that has ended so."""
+        """Whether a part is the continuation of one that ended with ``exit``."""
         forces_known = self.knows_no_force or not result.asked_back
         same = exit.content == result.entry.content
         return same and forces_known and not result.unsure and not self.stopped & result.went_on
 
     def and_then(self, result: PartResult, part: int | None) -> _Proven:
-        """Return this with a part more that is proven; ``part`` is the next."""
+        """Return this with one more proven part; ``part`` is the next one."""
         stopped = (self.stopped - result.scanned) | (result.exit.stopped & result.scanned)
         return _Proven((*self.counted, result.totals), part, stopped, result.exit.knows_no_force)
 
 
 class _SideBySide:
-    """One replay, in parts."""
+    """Executes one replay in parts."""
 
     def __init__(self, replay: Replay, parts: list[Part], on_progress: Progress) -> None:
         self._replay, self._parts, self._on_progress = replay, parts, on_progress
@@ -128,7 +128,7 @@ class _SideBySide:
         self._sizes = [sum(map(size_of, replay.reader.files[part.first : part.end])) for part in parts]
 
     def run(self, where: Workers) -> ReplayReport:
-        """Execute the parts, put them together, and do in this process what is left."""
+        """Execute the parts, join their results, and replay the rest in this process."""
         what = packed(self._replay)
         pieces = [Job(self._name(number), replay_part, (what, part)) for number, part in enumerate(self._parts)]
         run_pieces(pieces, where, self._take, self._is_over)
@@ -142,7 +142,7 @@ class _SideBySide:
         return self._gone_on(proven) or self._replay.run(self._on_progress)
 
     def _gone_on(self, proven: _Proven) -> ReplayReport | None:
-        """Go on in this process from a part on whose beginning is proven; None if that turns out to prove nothing."""
+        """Continue in this process with a part whose beginning is proven; None if that proof turns out not to hold."""
         assert proven.part is not None
         replay, first = self._replay, self._parts[proven.part].first
         if not first:
@@ -161,7 +161,7 @@ class _SideBySide:
         return replay.report(added_up([*proven.counted, totals.since(base)]), replay.options)
 
     def _proven(self) -> _Proven:
-        """Put the parts together as far as each begins where the one before has ended, and nothing differs."""
+        """Join the parts as far as each is the continuation of the one before, and nothing differs."""
         before: tuple[_Proven, CarriedState] | None = None
         proven = _Proven()
         for number in range(len(self._parts)):
@@ -190,7 +190,7 @@ class _SideBySide:
         self._on_progress(sizes / sum(self._sizes))
 
     def _is_over(self) -> bool:
-        """Whether some part will have to be done in this process, and all parts before it are done."""
+        """Whether the replay will continue in this process with some part, and all parts before it are done."""
         for number in range(len(self._parts)):
             if self._name(number) not in self._done:
                 return False
@@ -200,10 +200,10 @@ class _SideBySide:
         return False
 
     def _require_worker(self, piece: Job) -> None:
-        """Tell if a part has failed that does not fail here: its worker cannot read the recording, or has died.
+        """Check whether a failed part failed because of its worker, which died or cannot read the recording.
 
         Raises:
-            BagError: so it is.
+            BagError: the worker is the cause.
         """
         done = self._done.get(piece.name)
         if done is None or done.fault is None:

@@ -1,4 +1,4 @@
-"""The actions of `automax ctl` as arguments: of its command line, and of each line of its prompt."""
+"""The actions of `automax ctl`, and the arguments that each takes on the command line and at the prompt."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def _release(given: argparse.Namespace) -> list[ServiceCall]:
 
 
 def _means_all(names: Sequence[str]) -> bool:
-    """Return whether ``all`` stands for names, as in stimuli and in `automax step`; a REAL of that name is ``ALL``."""
+    """Return whether ``all`` replaces names, as in stimuli and in `automax step`; a REAL of that name is ``ALL``."""
     return list(names) == ["all"]
 
 
@@ -160,7 +160,7 @@ def _reload(given: argparse.Namespace) -> list[ServiceCall]:
 
 
 def _naming_file(task: str, file: Path) -> Callable[[str], str]:
-    """Return what names a file where the rack names the text of it that was sent: ``SPEED.BLK:1:1``."""
+    """Return a function that puts the file's name where the rack names the sent text: ``SPEED.BLK:1:1``."""
     sent = re.compile(rf"^{re.escape(task)}\.[A-Za-z]+(?=[: ])", re.MULTILINE)
     return lambda text: sent.sub(lambda _: str(file), text)
 
@@ -295,19 +295,19 @@ ACTIONS: Mapping[str, Action] = {
     ),
     "lifecycle": LIFECYCLE,
 }
-"""What can be asked, by the word for it."""
+"""The actions by name."""
 
 
 DEFAULT_TIMEOUT_S = "5"
 
 
 class ActionParser(argparse.ArgumentParser):
-    """The parser of one action; what stands below its help is made when it is asked for."""
+    """The parser of one action; the text below its help is created only when the help is printed."""
 
     more: Callable[[], str] = str
 
     def format_help(self) -> str:
-        """Return the help with what stands below it."""
+        """Return the help with the text below it."""
         below = self.more()
         return super().format_help() + (f"\n{below}\n" if below else "")
 
@@ -326,7 +326,7 @@ def add_actions(parser: argparse.ArgumentParser, *, required: bool = True) -> ar
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
-    """Add what all actions take."""
+    """Add the arguments that all actions have."""
     parser.add_argument("--json", action="store_true", help="print the answers for programs to read")
     parser.add_argument(
         "--timeout",

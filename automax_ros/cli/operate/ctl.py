@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Ask the rack; 1 where it refused something, 2 where it could not be asked."""
+    """Send the requests to the rack; 1 where it refused something, 2 where it could not be reached."""
     if arguments.action == SHELL:
         from automax_ros.cli.operate.prompt import run_shell
 

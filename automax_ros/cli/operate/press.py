@@ -1,4 +1,4 @@
-"""`automax ctl RACK press`: push-buttons and contacts are TRUE for a while, and FALSE again."""
+"""`automax ctl RACK press`: sets push-buttons and contacts to TRUE for a while, then to FALSE."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ DEFAULT_FOR_S = "0.2"
 _LOOK_S = 0.01
 _SET = "automax_msgs/SetValue"
 Answer = Callable[[ServiceCall, int], Any]
-"""Sends a request, waits for at most a time (ns), and returns the answer."""
+"""Sends a request, waits for at most a given time (ns), and returns the answer."""
 
 
 def add_press_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what is pressed, and for how long."""
+    """Add the arguments for what is pressed, and for how long."""
     parser.add_argument("names", nargs="+", metavar="NAME@", help="a BOOLEAN: START_PB@, LAMP@(3)")
     parser.add_argument(
         "--for",
@@ -39,7 +39,7 @@ def press_asks(given: argparse.Namespace) -> list[ServiceCall]:
     """Return the requests that set all names.
 
     Raises:
-        UsageError: one is not a BOOLEAN's.
+        UsageError: a name is not that of a BOOLEAN.
     """
     for name in given.names:
         if type_of_name(name.partition("(")[0].partition("[")[0].strip()) is not DataType.BOOLEAN:
@@ -50,9 +50,9 @@ def press_asks(given: argparse.Namespace) -> list[ServiceCall]:
 def press(
     answer: Answer, asks: Sequence[ServiceCall], given: argparse.Namespace, should_stop: Callable[[], bool]
 ) -> list[tuple[ServiceCall, Any]]:
-    """Set all names at once, hold them, and put back those that were FALSE; return what became of each.
+    """Set all names at once, hold them, and reset those that were FALSE; return the answer for each.
 
-    One that was TRUE already is not pressed: nobody would see an edge, and it is left as it is. Ctrl-C lets go early.
+    One that was TRUE already is not pressed, since no edge would result, and stays TRUE. Ctrl-C ends the press early.
     """
     pressed: list[tuple[ServiceCall, Any]] = []
     found: list[tuple[ServiceCall, Any]] = []

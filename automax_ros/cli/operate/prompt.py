@@ -1,4 +1,4 @@
-"""The prompt of `automax ctl RACK shell`: the actions of `automax ctl`, without their wait for the rack each time."""
+"""The prompt of `automax ctl RACK shell`: the actions of `automax ctl`, without looking for the rack each time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _HELP = "help"
 
 
 def run_shell(arguments: argparse.Namespace) -> int:
-    """Carry out lines of standard input until it ends or one says quit; 1 where one of a script failed.
+    """Carry out lines of standard input until its end or ``quit``; 1 where a line of a script failed.
 
     Raises:
         UsageError: there is no such rack, several have the name, or it cannot be operated.
@@ -40,7 +40,7 @@ _STATUS = ServiceCall("status", "automax_msgs/ReadStatus", {"home_only": True})
 
 
 class _Shell:
-    """Carries out lines; errors are told and do not end it."""
+    """Carries out lines; errors are printed and do not end it."""
 
     def __init__(self, session: Session, arguments: argparse.Namespace) -> None:
         self._session, self._given = session, arguments
@@ -60,7 +60,7 @@ class _Shell:
         return failed
 
     def completions(self, text: str) -> list[str]:
-        """Return the words that begin with a text: actions, commons, tasks; in any case where none begins with it."""
+        """Return the actions, commons and tasks that begin with a text; without a match, upper and lower case alike."""
         if self._names is None:
             self._names = self._known()
         words = [*ACTIONS, _HELP, _QUIT[0], *self._names]
@@ -83,7 +83,7 @@ class _Shell:
                 return 0
             arguments = self._parser.parse_args(words)
             return self._session.do(ACTIONS[arguments.action], arguments)
-        except SystemExit as stop:  # argparse has said what is wrong, or shown its help
+        except SystemExit as stop:  # argparse has printed an error or its help
             return int(bool(stop.code))
         except Interrupted:
             return 1
@@ -99,7 +99,7 @@ class _Shell:
         print("  quit       leave; so does Ctrl-D. ACTION --help says what one takes")
 
     def _known(self) -> list[str]:
-        """Return the names of commons and tasks, as far as the rack tells them."""
+        """Return the names of commons and tasks, as far as the rack answers."""
         wait_ns = self._given.timeout
         asks = [
             ServiceCall("get", "automax_msgs/ReadValues", {"names": ["*"]}),

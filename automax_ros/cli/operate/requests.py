@@ -1,4 +1,4 @@
-"""One request of `automax ctl`, and an action that consists of such."""
+"""Requests of `automax ctl`, and the actions that consist of them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any
 
 @dataclass(frozen=True)
 class ServiceCall:
-    """One request: the service, its type as ``package/Type``, the request's fields, and what it is about.
+    """One request: the service, its type as ``package/Type``, the request's fields, and what it concerns.
 
-    ``reword`` puts the rack's words into the person's, who knows files of this computer.
+    ``reword`` adapts texts of the rack for the user, such as names of files on this computer.
     """
 
     service: str
@@ -24,7 +24,7 @@ class ServiceCall:
 
 
 class Means(Enum):
-    """How the requests of an action are sent: each once, again and again, or as a press of buttons."""
+    """How the requests of an action are sent: each once, repeatedly, or as a press of buttons."""
 
     ONCE = "once"
     WATCH = "watch"
@@ -37,12 +37,11 @@ def _done(_: ServiceCall, __: Any) -> str:
 
 @dataclass(frozen=True)
 class Action:
-    """An action: its line of help, its arguments, its requests, and for a reading what an answer holds.
+    """An action: its line of help, its arguments, its requests, and the presentation of answers.
 
-    ``read`` returns data for JSON, ``lines`` how a person reads them, ``told`` what a person is told of an operation
-    that was carried out. ``by_operator``: it needs a rack with an operator's services; ``acts``: it
-    changes something, though its answer is read. ``more`` returns what stands
-    below its help.
+    ``read`` returns the data of an answer for JSON, ``lines`` the lines of text for these data, ``told`` the text for
+    an operation that was carried out. ``by_operator``: it needs a rack with the operator's services; ``acts``: it
+    changes something, although its answer is read. ``more`` returns the text below its help.
     """
 
     help: str
@@ -58,5 +57,5 @@ class Action:
 
     @property
     def reads(self) -> bool:
-        """Whether it changes nothing in the rack."""
+        """Whether the action changes nothing in the rack."""
         return self.read is not None and not self.acts

@@ -1,4 +1,4 @@
-"""What `automax ctl` does with one rack: asks, and prints the answers; one action or, at the prompt, many."""
+"""A session of `automax ctl` with one rack: sends the requests of actions and prints the answers."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 
 Answers = list[tuple[ServiceCall, Any]]
 _NOW = ("status", "now", "forced", "powered", "message")
-"""Fields in which an answer says what is true now."""
+"""Fields of an answer that contain the new state."""
 
 
 class _Refused(Exception):
-    """What was asked for was refused; the text says why."""
+    """The rack refused a request; the text says why."""
 
 
 class Session:
-    """Speaks with one rack by a client; ``should_stop`` ends what waits or repeats."""
+    """Operates one rack through a client; ``should_stop`` ends waits and repetitions."""
 
     def __init__(self, client: RackClient, should_stop: Callable[[], bool]) -> None:
         self._client, self._should_stop = client, should_stop
@@ -55,17 +55,17 @@ class Session:
         return 0 if all(_ok(answer) for _, answer in answers) else 1
 
     def ask(self, ask: ServiceCall, wait_ns: int) -> Any:
-        """Return the answer to one request of a rack that only reads; None where it was refused."""
+        """Return the answer to one request that only reads; None where it was refused."""
         self._find(wait_ns, alone=False)
         answer = self._answer(ask, wait_ns)
         return answer if _ok(answer) else None
 
     def _find(self, wait_ns: int, *, alone: bool) -> None:
-        """See that the rack is there and, before something is done to it, that it is the only one of its name.
+        """Check that the rack is there and, before it is operated, that it is the only one of its name.
 
-        A rack that has looked around for long knows better than a program that has just come: it is asked, where all
-        racks that this program reaches are on this host and so reach each other, too. Else the graph is looked at for
-        a while (decision).
+        A rack that has long been in the graph knows more of it than a program that has just started. So the rack is
+        asked how many there are, provided that all racks in reach are on this host and thus reach each other, too.
+        Else the graph is observed for a while (decision).
         """
         from automax_ros.ros.clients.rack_client import ALONE_NS
         from automax_ros.ros.setup.discovery import is_this_host_alone
@@ -102,7 +102,7 @@ class Session:
 
 @contextmanager
 def connected(arguments: argparse.Namespace, should_stop: Callable[[], bool]) -> Iterator[Session]:
-    """Join the graph, and speak with the rack while the block lasts.
+    """Join the graph, and yield a session with the rack while the block lasts.
 
     Raises:
         UsageError: there is no such rack, several have the name, or it cannot be operated.
@@ -119,7 +119,7 @@ def connected(arguments: argparse.Namespace, should_stop: Callable[[], bool]) ->
 
 
 def _ok(answer: Any) -> bool:
-    """Return whether the rack did what was asked: the readings that cannot be refused do not say."""
+    """Return whether the rack carried out the request; answers to reads that cannot be refused have no such field."""
     return bool(getattr(answer, "ok", getattr(answer, "success", True)))
 
 

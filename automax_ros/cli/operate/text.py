@@ -1,4 +1,4 @@
-"""The answers of a rack as `automax ctl` prints them, a line each."""
+"""The answers of a rack as lines of text, for `automax ctl`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from automax_ros.core.types import type_of_name
 from automax_ros.core.values import source_text, value_of
 
 ALREADY = "was already"
-"""How it begins where a value was there before."""
+"""Beginning of the text for a value that was set before."""
 
 
 def fields_of(item: Any) -> dict[str, Any]:
@@ -53,12 +53,12 @@ def error_lines(data: Any) -> Iterable[str]:
 
 
 def step_lines(data: Any) -> Iterable[str]:
-    """Return how a step ended."""
+    """Return the result of a step."""
     yield f"step: {data['why']} at {data['time_s']:.9g} s, {count_of(data['scans'], 'scan')}"
 
 
 def status_lines(data: Any) -> Iterable[str]:
-    """Return how a rack stands, its drives with their faults, and what the displays of its Processors show."""
+    """Return the status of a rack, the faults of its drives, and the displays of its Processors."""
     power = "" if data["powered"] else ", the power is off"
     ended = f", {data['ended']} ended" if data["ended"] else ""
     runs = f"{data['running']} run{ended}" if ended else f"{data['running']} of {count_of(data['tasks'], 'task')} run"
@@ -80,25 +80,25 @@ def status_lines(data: Any) -> Iterable[str]:
 
 
 def message_told(_: ServiceCall, answer: Any) -> str:
-    """Return what an answer says of an operation that was carried out."""
+    """Return the text for an operation that was carried out."""
     told = getattr(answer, "message", "")
     return f"done, {told}" if told else "done"
 
 
 def value_told(ask: ServiceCall, answer: Any) -> str:
-    """Return whether a value was given, or was there before."""
+    """Return the text for a value that was written, or that the variable had already."""
     if answer.before and answer.before == answer.now and answer.now == _written(ask):
         return f"{ALREADY} {ask.fields['value'].strip()}"
     return "done"
 
 
 def reload_told(_: ServiceCall, answer: Any) -> str:
-    """Return what a reload has taken away."""
+    """Return the text for a reload, with what was lost."""
     return f"done; {answer.lost}: --keep-state keeps what was tuned" if answer.lost else "done"
 
 
 def _written(ask: ServiceCall) -> str:
-    """Return the value of a request as a program writes it, "" where it writes none."""
+    """Return the value of a request as a program writes it, "" where it is not a value."""
     name, text = "".join(ask.fields["name"].split()).partition("(")[0], ask.fields["value"]
     value = value_of(text.strip(), type_of_name(name.partition("[")[0].upper()))
     return "" if value is None else source_text(value)

@@ -1,4 +1,4 @@
-"""`automax ctl RACK watch`: asks again and again, and prints what has changed."""
+"""`automax ctl RACK watch`: reads values repeatedly and prints those that have changed."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ NAMES_HELP = "REF%%, TABLE%%(3), SPEED.ERROR%%; patterns in quotes: 'F_*', 'SPEE
 _LOOK_S = 0.05
 
 Read = Callable[[], list[dict[str, str]]]
-"""Asks the rack for values: each with its ``name`` and ``value``."""
+"""Reads values from the rack, each with its ``name`` and ``value``."""
 
 
 def add_watch_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what is watched, how often, and for how long."""
+    """Add the arguments for what is watched, how often, and for how long."""
     parser.add_argument("names", nargs="+", metavar="NAME", help=NAMES_HELP)
     parser.add_argument(
         "--every",
@@ -40,8 +40,8 @@ def add_watch_arguments(parser: argparse.ArgumentParser) -> None:
 def watch(read: Read, arguments: argparse.Namespace, is_over: Callable[[], bool]) -> None:
     """Print every value, then those that have changed, until the time or ``is_over`` ends it.
 
-    A value that comes and goes between two looks is not seen: `automax record` misses none. With ``json`` each line is
-    an object of its own.
+    A value that appears and disappears between two reads is not seen; `automax record` misses none. With ``json`` each
+    line is a separate object.
     """
     end_ns = None if arguments.duration is None else time.monotonic_ns() + arguments.duration
     shown: dict[str, str] = {}
@@ -64,7 +64,7 @@ def values_of(answer: Any) -> list[dict[str, str]]:
     """Return the names and values of an answer; ``shown`` where a value has a unit.
 
     Raises:
-        Fault: they are not as many: no rack of ours answers so.
+        UserError: their numbers differ, which is not the answer of an AutoMax rack.
     """
     if not len(answer.found) == len(answer.values) == len(answer.shown):
         count = f"{count_of(len(answer.found), 'name')} and {count_of(len(answer.values), 'value')}"
@@ -76,7 +76,7 @@ def values_of(answer: Any) -> list[dict[str, str]]:
 
 
 def value_line(item: Mapping[str, str]) -> str:
-    """Return a value for a person: ``LEVEL% = 2048 (5.001 bar)``, ``SPEED% = 1500 fpm`` where the unit is all."""
+    """Return a value as text: ``LEVEL% = 2048 (5.001 bar)``, or ``SPEED% = 1500 fpm`` if it has a unit but no scale."""
     value, shown = item["value"], item.get("shown", "")
     if shown.startswith(f"{value} "):
         return f"{item['name']} = {shown}"

@@ -1,4 +1,4 @@
-"""Tunables on the command line: ``--set TASK.NAME=VALUE``."""
+"""A rack file on the command line, and the values that ``--set`` gives to its commons and tunables."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from automax_ros.rackfile.model.value_names import Tuning, setting, tuning
 from automax_ros.rackfile.modules.registry import SUPPORTED
 
 DEFAULT_RACK_FILE = "rack.yaml"
-"""What a folder means where a rack file is asked for."""
+"""The file that a folder stands for where a rack file is expected."""
 _CANNOT_BE_READ = "AMX6000"
 _NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
 
 
 def add_set_argument(parser: argparse.ArgumentParser, *, tunables: bool = False) -> None:
-    """Add ``--set``, any number of times, as ``settings``; it may take ``tunables``, too."""
+    """Add ``--set``, any number of times, as ``settings``; ``tunables``: for tunables, too."""
     what = "a common variable, or tune TASK.NAME," if tunables else "a common variable"
     parser.add_argument(
         "--set",
@@ -54,7 +54,7 @@ def load_rack_file(path: Path, *, allow_outside: bool) -> LoadResult:
     """Read a rack file, or the ``rack.yaml`` of a folder.
 
     Raises:
-        UsageError: it cannot be read, or is a task.
+        UsageError: the file cannot be read, or is a task.
     """
     path = _meant(path)
     result = load(path, allow_outside=allow_outside)
@@ -70,12 +70,12 @@ def is_rack_folder(path: Path) -> bool:
 
 
 def is_text(result: LoadResult) -> bool:
-    """Whether a rack file could be read as text; too large, or not UTF-8, it counts as unreadable."""
+    """Whether a rack file could be read as text: it is neither too large nor something other than UTF-8."""
     return not any(item.code in _NOT_A_TEXT for item in result.diagnostics)
 
 
 def size_of(rack: RackConfig) -> str:
-    """Return what a rack consists of, in words."""
+    """Return the numbers of modules, tasks and commons of a rack, in words."""
     modules = Counter(SUPPORTED[module.model].word for module in rack.task_modules)
     counts = [(number, f"{word[0].upper()}{word[1:]}") for word, number in modules.items()]
     counts += [(len(rack.placed_tasks), "task"), (len(rack.declared), "common")]
@@ -83,10 +83,10 @@ def size_of(rack: RackConfig) -> str:
 
 
 def _meant(path: Path) -> Path:
-    """Return the rack file that an argument means.
+    """Return the rack file that an argument names, itself or by its folder.
 
     Raises:
-        UsageError: it is a task, or a folder without a rack file.
+        UsageError: the argument is a task, or a folder without a rack file.
     """
     if is_task_file(path):
         hint = f"`automax trace {path} --input IN.csv` runs a task alone; `automax new {path.parent}` makes a rack file"
@@ -101,9 +101,9 @@ def _meant(path: Path) -> Path:
 
 
 def config_of(path: Path, *, allow_outside: bool, quiet: bool = False) -> RackConfig | None:
-    """Return a rack's configuration; what is wrong with its file is printed, and None returned where it has errors.
+    """Return a rack's configuration; if its file has errors, print them and return None.
 
-    Of a file that can be used its warnings are counted, ``quiet``: not even that, since another process has done it.
+    The warnings of a usable file are counted on standard error, but not if ``quiet``: another process has done it.
 
     Raises:
         UsageError: the file cannot be read.
@@ -119,10 +119,10 @@ def config_of(path: Path, *, allow_outside: bool, quiet: bool = False) -> RackCo
 
 
 def usable_config(path: Path, *, allow_outside: bool) -> RackConfig:
-    """Return a rack's configuration; its warnings are counted.
+    """Return a rack's configuration; its warnings are counted on standard error.
 
     Raises:
-        RackError: the file has errors, which it holds.
+        RackError: the file has errors, which the exception contains.
         UsageError: the file cannot be read.
     """
     result = load_rack_file(path, allow_outside=allow_outside)
@@ -136,7 +136,7 @@ def namespace_of(path: Path) -> str:
     """Return the namespace of a rack whose file may have errors.
 
     Raises:
-        UsageError: the file cannot be read, or says no name.
+        UsageError: the file cannot be read, or has no rack name.
     """
     found = load_rack_file(path, allow_outside=False).namespace
     if found is None:
@@ -145,10 +145,10 @@ def namespace_of(path: Path) -> str:
 
 
 def settings_of(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
-    """Return what the texts of ``--set`` give common variables.
+    """Return the values that the texts of ``--set`` give to common variables.
 
     Raises:
-        UsageError: one of them is at fault.
+        UsageError: a text is wrong.
     """
     settings = []
     for text in texts:
@@ -160,7 +160,7 @@ def settings_of(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]
 
 
 def _tunable_hint(config: RackConfig, text: str) -> str | None:
-    """Return what to do where NAME=VALUE, or TASK.NAME=VALUE, names a tunable of a task; None where it does not."""
+    """Return a hint if NAME=VALUE, or TASK.NAME=VALUE, names a tunable of a task, else None."""
     name, _, value = (part.strip().upper() for part in text.partition("="))
     for task, _, result in check_tasks(config):
         symbol = result.program.symbols.get(name.removeprefix(f"{task.name}.")) if result.program is not None else None
@@ -182,10 +182,10 @@ def print_refused(command: str, error: RackError) -> int:
 
 
 def split_settings(config: RackConfig, texts: list[str]) -> tuple[list[tuple[str, Value]], list[Tuning]]:
-    """Return what the texts of ``--set`` give common variables, and what they give tunables.
+    """Return the values that the texts of ``--set`` give to common variables, and those for tunables.
 
     Raises:
-        UsageError: one of them is at fault.
+        UsageError: a text is wrong.
     """
     programs: dict[str, Program] = {}
     if any("." in _name(text) for text in texts):
@@ -204,9 +204,9 @@ def split_settings(config: RackConfig, texts: list[str]) -> tuple[list[tuple[str
 
 
 def begin_with(rack: Rack, tunings: Sequence[Tuning]) -> None:
-    """Give tunables what ``--set`` says, before the rack runs.
+    """Set tunables to the values of ``--set``, before the rack runs.
 
-    It counts more than the values kept from the last run, and more than parameters of ROS (decision: who types it means
+    They override the values kept from the last run, and ROS parameters (decision: who types it means
     this run).
 
     Raises:

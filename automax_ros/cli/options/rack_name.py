@@ -1,4 +1,4 @@
-"""The namespace of a running rack, from what the person calls it."""
+"""The namespace of a running rack, from its name, namespace, YAML file or folder."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def _is_rack_folder(path: Path) -> bool:
 
 
 def config_of(path: Path) -> RackConfig:
-    """Return what a rack's YAML file says, or the ``rack.yaml`` of a folder.
+    """Return the configuration of a rack's YAML file, or of the ``rack.yaml`` of a folder.
 
     Raises:
-        UsageError: it has errors, cannot be read or is a task.
+        UsageError: the file has errors, cannot be read or is a task.
     """
-    # A rack that is called by its name needs none of this: it takes longer to load than the rack takes to answer.
+    # A rack given by its name needs none of these modules: loading them takes longer than the rack takes to answer.
     from automax_ros.cli.options.rack import load_rack_file
     from automax_ros.core.diagnostics import has_errors
 
@@ -50,10 +50,10 @@ def config_of(path: Path) -> RackConfig:
 def space_of(text: str, ros: RosArguments = NO_ARGUMENTS) -> str:
     """Return the namespace with its slash, such as ``/pm1``, of a rack's name, namespace, YAML file or folder.
 
-    It lies in the namespace that ROS arguments give, unless it begins with a slash.
+    It is placed in the namespace that ROS arguments give, unless it begins with a slash.
 
     Raises:
-        UsageError: it is none of these.
+        UsageError: the text is none of these.
     """
     if names_file(text):
         return f"/{ros.placed(config_of(Path(text)).namespace)}"

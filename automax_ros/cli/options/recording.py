@@ -1,4 +1,4 @@
-"""The options of `automax run` and `automax record` that say how a run is recorded."""
+"""The options of `automax run` and `automax record` for recordings."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def recording_options(arguments: argparse.Namespace, config: RackConfig) -> RecordingOptions:
-    """Return what the arguments say.
+    """Return the recording options that the arguments give.
 
     Raises:
-        UsageError: one of them makes no sense, or there is no --record.
+        UsageError: an argument is wrong, or there is no --record.
     """
     given = [name for name in _NAMES if getattr(arguments, f"record_{name}") not in (None, False)]
     if given and arguments.record is None:
@@ -60,7 +60,7 @@ def recording_options(arguments: argparse.Namespace, config: RackConfig) -> Reco
 
 
 def storage_options(compression: str | None, split_mb: str | None, prefix: str) -> StorageOptions:
-    """Return how a recording is stored; ``prefix`` begins the names of the options.
+    """Return the storage options of a recording; the names of the options begin with ``prefix``.
 
     Raises:
         UsageError: an unknown compression, or a size out of range.

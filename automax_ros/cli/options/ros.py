@@ -1,4 +1,4 @@
-"""ROS 2 for a subcommand that needs it, and what its command line says to ROS."""
+"""ROS 2 for a subcommand that needs it, and the ROS arguments of its command line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _RANGES = ("localhost", "subnet", "off")
 
 
 def add_ros_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--range``, and let the subcommand take ``--ros-args`` as ``ros``."""
+    """Add ``--range``, and make the subcommand accept ``--ros-args`` as ``ros``."""
     parser.add_argument(
         "--range",
         choices=_RANGES,
@@ -26,7 +26,7 @@ def add_ros_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def ros_arguments(arguments: argparse.Namespace) -> RosArguments:
-    """Return what the command line and ROS_NAMESPACE say to ROS.
+    """Return the ROS arguments of the command line and of ROS_NAMESPACE.
 
     Raises:
         RosArgumentsError: ROS_NAMESPACE is not a namespace.
@@ -38,11 +38,11 @@ def ros_arguments(arguments: argparse.Namespace) -> RosArguments:
 
 
 def prepare_ros(arguments: argparse.Namespace, hint: str | None = None) -> int:
-    """Make ROS 2 usable, before any input is read, and return the domain; ``hint`` says what to do without it.
+    """Make ROS 2 usable, before any input is read, and return the domain; ``hint`` says what to do without ROS 2.
 
     Raises:
-        UsageError: it is not there, or ROS_DOMAIN_ID names no domain.
-        RosArgumentsError: ROS cannot take its arguments.
+        UsageError: ROS 2 is not available, or ROS_DOMAIN_ID is not a domain.
+        RosArgumentsError: ROS does not accept its arguments.
     """
     from automax_ros.ros.setup.environment import RosUnavailable, prepare
 

@@ -1,4 +1,4 @@
-"""Stimuli files on the command line: read, told what is wrong with them, made ready to happen."""
+"""Stimuli files on the command line: read, diagnosed, and made ready to be played."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class StimuliRefused(Exception):
 
 
 def stimulation(rack: Rack, path: Path | None, *, allow_outside: bool) -> StimuliPlayer:
-    """Return what a file lets happen to a rack, nothing without a file; its warnings are printed.
+    """Return the player of a stimuli file, an empty one without a file; its warnings are printed.
 
     Raises:
         StimuliRefused: the file has errors.
@@ -30,7 +30,7 @@ def stimulation(rack: Rack, path: Path | None, *, allow_outside: bool) -> Stimul
 
 
 def entries_of(file: StimuliFile) -> tuple[Stimulus, ...]:
-    """Return the entries of a file that was read; what was found in it is printed.
+    """Return the entries of a file that was read; its diagnostics are printed.
 
     Raises:
         StimuliRefused: the file has errors.

@@ -1,4 +1,4 @@
-"""The options of ``tune-info`` and ``response`` that choose a block and give values to variables."""
+"""Options for a task by itself: its Processor and tick, the choice of a block, and values of variables."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from automax_ros.tuning.dynamic_calls import DynamicCall, NoDynamicBlock, ValueF
 
 _RACK_SUFFIXES = (".YAML", ".YML")
 _MILLISECONDS = re.compile(r"[0-9]{1,6}(\.[0-9]{0,6})?|\.[0-9]{1,6}")
-"""Bounded: an exponent of many digits would take for ever to become an exact number."""
+"""Bounded, with no exponent: converting a huge exponent to an exact number would take forever."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where a task given by itself runs: the kind of Processor and its tick in ns."""
+    """The target of a task given without a rack: the kind of Processor and its tick in ns."""
 
     processor: Platform
     tick_ns: int
@@ -52,7 +52,7 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def target_of(arguments: argparse.Namespace) -> Target:
-    """Return what ``--target`` and ``--tick-ms`` ask for.
+    """Return the target that ``--target`` and ``--tick-ms`` give.
 
     Raises:
         UsageError: not a tick that this Processor can have.
@@ -68,7 +68,7 @@ def target_of(arguments: argparse.Namespace) -> Target:
 
 
 def tick_option(text: str) -> int:
-    """Return the tick in ns that ``--tick-ms`` asks for.
+    """Return the tick in ns that ``--tick-ms`` gives.
 
     Raises:
         UsageError: not a tick that a Processor can have.
@@ -82,13 +82,13 @@ def tick_option(text: str) -> int:
 
 
 def is_rack_file(path: Path) -> bool:
-    """Whether a path means a rack file: by its name, or as the folder of one."""
+    """Whether a path names a rack file, by its suffix, or a folder, which may contain one."""
     suffix = path.suffix.upper()
     return suffix in _RACK_SUFFIXES or (not is_task_file(path) and path.is_dir())
 
 
 def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult]:
-    """Check a task by itself: its own COMMON statements count as the definition of the rack's commons.
+    """Check a task without a rack: its COMMON statements serve as the definition of the rack's commons.
 
     Raises:
         UsageError: the file cannot be read, or is of a kind that has no checker.
@@ -105,10 +105,10 @@ def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult
 
 
 def require_clock(path: Path, program: Program) -> None:
-    """Refuse a task whose scans follow an AC line: no clock begins them, so they have no scan period to count with.
+    """Refuse a task whose scans follow an AC line: no clock starts them, so they have no scan period.
 
     Raises:
-        UsageError: it is one.
+        UsageError: the task is one.
     """
     if program.cml is not None:
         message = (
@@ -120,13 +120,13 @@ def require_clock(path: Path, program: Program) -> None:
 
 
 def check_text(path: Path, text: str, target: Target) -> CheckResult:
-    """Check the text of a task by itself, as that of a file of this name."""
+    """Check the text of a task without a rack, as that of a file of this name."""
     source = SourceText(str(path), text)
     return check(source, name=path.stem.upper(), catalogue=CATALOGUE, target=target.processor, tick_ns=target.tick_ns)
 
 
 def name_warning(path: Path) -> Diagnostic | None:
-    """Return a warning where no task can be named after the file, which is what the Executive does (2.4.1)."""
+    """Return a warning if a task cannot be named after the file, as the Executive names it (2.4.1)."""
     stem = path.stem
     try:
         check_task_name(stem.upper() if stem.isascii() else stem)
@@ -142,7 +142,7 @@ def require_task(path: Path) -> None:
     """Refuse a file whose name is not that of a task.
 
     Raises:
-        UsageError: it is of another kind.
+        UsageError: the file is of another kind.
     """
     try:
         kind_of_file(path)
@@ -169,10 +169,10 @@ def add_call_arguments(parser: argparse.ArgumentParser, *, required: bool) -> No
 
 
 def chosen_calls(program: Program, arguments: argparse.Namespace, *, driven: bool = False) -> list[DynamicCall]:
-    """Return the dynamic blocks that the options ask for, with the values they give.
+    """Return the dynamic blocks that the options choose, with the values that the options give.
 
     Raises:
-        UsageError: there are none, or an option is at fault.
+        UsageError: there are none, or an option is wrong.
     """
     try:
         return dynamic_calls(program, settings_of(program, arguments.settings), arguments.block, driven=driven)
@@ -183,10 +183,10 @@ def chosen_calls(program: Program, arguments: argparse.Namespace, *, driven: boo
 
 
 def settings_of(program: Program, texts: Sequence[str]) -> dict[str, Value]:
-    """Return what texts ``NAME=VALUE`` give the variables of a task, by their labels.
+    """Return the values that texts ``NAME=VALUE`` give to variables of a task, by label.
 
     Raises:
-        UsageError: one of them is at fault, or two are for the same variable.
+        UsageError: a text is wrong, or two are for the same variable.
     """
     values: dict[str, Value] = {}
     for text in texts:

@@ -1,4 +1,4 @@
-"""The list of variables given with ``--watch``."""
+"""Values of options: numbers, times, windows, and the list of variables given with ``--watch``."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def whole_number(text: str) -> int:
 
 
 def option_number(option: str, text: str, low: float, high: float, what: str = "a number") -> float:
-    """Return the number that was given to an option.
+    """Return the number given to an option.
 
     Raises:
-        UsageError: it is not one from ``low`` to ``high``.
+        UsageError: it is not a number from ``low`` to ``high``.
     """
     try:
         found = values.number(text)
@@ -66,7 +66,7 @@ def add_grid_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def window_of(arguments: argparse.Namespace) -> Window:
-    """Return the window that the options ask for.
+    """Return the window that the options give.
 
     Raises:
         UsageError: it ends before it begins.
@@ -80,7 +80,7 @@ def window_of(arguments: argparse.Namespace) -> Window:
 
 
 def seconds(text: str) -> int:
-    """Return a time in seconds, 0 or more, in nanoseconds, rounded to the nearest: the type of an option."""
+    """Convert a time of 0 s or more to nanoseconds, rounded to the nearest: the type of an option."""
     try:
         return seconds_ns(text)
     except ValueError as error:
@@ -88,7 +88,7 @@ def seconds(text: str) -> int:
 
 
 def seconds_above_0(text: str) -> int:
-    """Return a time in seconds that is not 0, in nanoseconds: the type of an option."""
+    """Convert a time of more than 0 s to nanoseconds: the type of an option."""
     found = seconds(text)
     if not found:
         raise argparse.ArgumentTypeError(f"{text} s is too short: give more")
@@ -96,11 +96,11 @@ def seconds_above_0(text: str) -> int:
 
 
 _COMMA = re.compile(r",(?![^(\[]*[)\]])")
-"""A comma that does not stand between subscripts."""
+"""A comma that is not between subscripts."""
 
 
 def add_watch_argument(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add ``--watch``; ``default`` says what is watched without it."""
+    """Add ``--watch``; ``default`` describes what is watched without it."""
     parser.add_argument(
         "--watch",
         action="append",

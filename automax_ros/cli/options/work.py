@@ -1,4 +1,4 @@
-"""``--native``: whether scans are machine code; ``--verbose``: which tasks are, and why others are not."""
+"""``--jobs`` and ``--scheduler``: where work is done; ``--native`` and ``--verbose``: scans as machine code."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from automax_ros.parallel.job import Workers
 
 _AUTO = "auto"
 MOST_JOBS = 1024
-"""Most processes that are begun side by side (decision: a slip of the finger shall not bring a machine down)."""
+"""Most processes that are started in parallel (decision: a slip of the finger shall not bring a machine down)."""
 
 
 def add_where_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add ``--jobs`` and ``--scheduler``; ``what`` is done side by side."""
+    """Add ``--jobs`` and ``--scheduler``; ``what`` is done in parallel."""
     parser.add_argument(
         "--jobs",
         type=_jobs,
@@ -34,10 +34,10 @@ def add_where_arguments(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def where_of(arguments: argparse.Namespace) -> Workers:
-    """Return where pieces are done.
+    """Return the workers that the options choose.
 
     Raises:
-        UsageError: on the cores of this machine and by a cluster, both.
+        UsageError: both options are given, or an address is empty.
     """
     jobs, scheduler = arguments.jobs, arguments.scheduler
     if scheduler is None:
@@ -59,7 +59,7 @@ def _jobs(text: str) -> int | str:
 
 
 _LIVE_LIMIT_S = 20.0
-"""Longest that the start of a rack on the wall clock waits for one task to be built, s (decision)."""
+"""Longest time that the start of a rack on the wall clock waits for the build of one task, s (decision)."""
 
 
 def add_native_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +77,7 @@ def add_native_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def native_forms(arguments: argparse.Namespace, expected_ns: int | None, *, wall_clock: bool = False) -> NativeForms:
-    """Return what the command line wants; ``expected_ns`` is the task time that will pass, None without an end.
+    """Return the native forms that the options choose; ``expected_ns`` is the task time of the run, None if endless.
 
     On the wall clock scans gain nothing by it, for they wait for their deadlines: only ``on`` makes them native there.
     Tasks are built before the rack is put into RUN, those of a reload while the old ones scan (decision).
@@ -90,6 +90,6 @@ def native_forms(arguments: argparse.Namespace, expected_ns: int | None, *, wall
 
 
 def tell_native(outcomes: Iterable[NativeOutcome]) -> None:
-    """Say what became of each task."""
+    """Print the outcome for each task on standard error."""
     for outcome in outcomes:
         print(outcome.text, file=sys.stderr)

@@ -1,1 +1,1 @@
-"""What subcommands write and show: files, the terminal, pictures; and signals."""
+"""Input and output of subcommands: files, the terminal, pictures; and signals."""

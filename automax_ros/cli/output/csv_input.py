@@ -1,4 +1,4 @@
-"""A CSV table that a subcommand reads: a header with names of variables, then one row per scan, a line each.
+"""A CSV table that a subcommand reads: a header with names of variables, then one line per scan.
 
 The table is read line by line, so that one of millions of rows takes no more memory than one of ten.
 """
@@ -24,14 +24,14 @@ _Table = TypeVar("_Table", bound="CsvTable")
 
 
 class CsvFault(UserError):
-    """Something is wrong with a table: ``code`` AMX6910 to AMX6916; ``place`` is the file and its line."""
+    """An error in a table: ``code`` AMX6910 to AMX6916; ``place`` is the file and the line."""
 
 
 class CsvTable:
     """An open table, closed at the end of a ``with``. ``header`` has the cells of its first line, at least one.
 
-    Cells are separated by commas, or by semicolons where the header has one (decision: no variable's name has): so
-    spreadsheets write them where the decimal point is a comma.
+    Cells are separated by commas, or by semicolons where the header has one (decision: no variable's name has):
+    spreadsheets write semicolons where the decimal point is a comma.
     """
 
     def __init__(self, path: Path) -> None:
@@ -70,26 +70,26 @@ class CsvTable:
 
     @property
     def size(self) -> int:
-        """Bytes of the whole table; 0 where that is not known beforehand."""
+        """Size of the whole table in bytes; 0 where it is not known beforehand."""
         return os.fstat(self._stream.fileno()).st_size
 
     @property
     def position(self) -> int:
-        """Bytes that were read so far."""
+        """Number of bytes read so far."""
         return self._stream.tell() if self._stream.seekable() else 0
 
     def fault(self, code: str, message: str, hint: str | None = None, line: int | None = None) -> CsvFault:
-        """Return a fault of a line, the one that was read last unless another is given."""
+        """Return a fault of a line, by default of the one that was read last."""
         return CsvFault(message, hint, code=code, place=f"{self.path}:{line or self._line or 1}")
 
     def numbered_rows(self) -> Iterator[tuple[int, list[str]]]:
-        """Yield each row's line and its cells, as many as the header has.
+        """Yield each row's line number and its cells, as many as the header has.
 
-        Empty lines at the end are not rows; in a table of one column an empty line before is a row with an empty cell.
+        Empty lines at the end are not rows; in a table of one column, earlier ones are rows with an empty cell.
 
         Raises:
-            UsageError: the file cannot be read any more.
-            CsvFault: a row is at fault.
+            UsageError: the file can no longer be read.
+            CsvFault: a row is wrong.
         """
         last_row = self._line
         while (cells := self._next_line()) is not None:
@@ -104,7 +104,11 @@ class CsvTable:
             yield self._line, cells
 
     def _empty_rows(self, lines: range) -> range:
-        """Return the empty lines between two rows, as rows."""
+        """Return the empty lines between two rows, which are rows in a table of one column.
+
+        Raises:
+            CsvFault: the table has more columns.
+        """
         if lines and len(self.header) > 1:
             raise self.fault(
                 "AMX6914",

@@ -24,24 +24,24 @@ _ANALOG_IN, _ROW_IN, _HEAD_IN = 2.2, 0.32, 1.1
 _HIGHEST_IN = 40.0
 _ROW_FILL = 0.7
 _THICKEST = 1.9
-"""Lines get thinner one after the other, and the later ones have gaps, so that one that lies under another is seen."""
+"""Each line is thinner than the one before, and later ones have gaps, so that a covered line remains visible."""
 _ROLES: dict[Role, dict[str, Any]] = {
     Role.PLANT: {"color": "#b4bfc5", "linewidth": 4.0, "linestyle": "-", "zorder": 2.0},
     Role.FEEDBACK: {"color": "#1565c0", "linewidth": 1.3, "linestyle": "-", "zorder": 2.1},
     Role.LAGGED: {"color": "#ef6c00", "linewidth": 1.3, "linestyle": (0, (5, 4)), "zorder": 2.2},
     Role.REFERENCE: {"color": "#000000", "linewidth": 1.3, "linestyle": (0, (1, 4)), "zorder": 2.3},
 }
-"""How lines look that mean the same, and mostly agree: the plant's wide and pale underneath, what is wanted in thin
-dots on top, so that each is seen where all are equal (decision)."""
+"""Styles of lines that show the same quantity and mostly agree: the plant's wide and pale underneath, the reference in
+thin dots on top, so that each is seen where all are equal (decision)."""
 _MOST_LONG_MARKS = 40
-"""Up to this many errors are marked by a line through all lanes too."""
+"""Up to this many errors are also marked by a line through all lanes."""
 _LABEL_PX = 90
-"""Room that the code of an error takes."""
+"""Width of an error code, in pixels."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a picture is laid out: title, size in pixels (height 0: as it needs), a lane for each analog variable."""
+    """The layout of a picture: title, size in pixels (height 0: as needed), whether each analog variable has a lane."""
 
     title: str
     width_px: int = 1400
@@ -86,7 +86,7 @@ def figure_of(traces: Traces, layout: Layout) -> Any:
 
 
 def save(figure: Any, path: Path) -> None:
-    """Write the figure; the suffix says in which format. The same figure gives the same bytes.
+    """Write the figure in the format of the suffix. The same figure gives the same bytes.
 
     Raises:
         UsageError: the file cannot be written.
@@ -96,7 +96,7 @@ def save(figure: Any, path: Path) -> None:
 
 
 def save_picture(picture: bytes, path: Path) -> None:
-    """Write a figure that is drawn already.
+    """Write a picture that has been drawn already.
 
     Raises:
         UsageError: the file cannot be written.
@@ -131,7 +131,7 @@ def _draw_into(figure: Any, place: Path | io.BytesIO, kind: str) -> None:
 
 
 def _lanes(lines: Sequence[Line], separate: bool) -> list[list[Line]]:
-    """Analog lines by lane: those of one unit share it, in the order of the first of them."""
+    """Return analog lines by lane: those of one unit share a lane, in the order of their first line."""
     lanes: dict[object, list[Line]] = {}
     for number, line in enumerate(lines):
         lanes.setdefault(number if separate else line.variable.unit.strip(), []).append(line)
@@ -139,7 +139,7 @@ def _lanes(lines: Sequence[Line], separate: bool) -> list[list[Line]]:
 
 
 def _points(line: Line, traces: Traces, width_px: int) -> tuple[list[float], list[float]]:
-    """The corners of a line of steps: no more than can be seen, and its last value held to the end."""
+    """Return the points of a stepped line: no more than can be seen, its last value held to the end."""
     times, values = thinned(line.times, line.values, width_px)
     xs, ys = times.tolist(), values.tolist()
     if xs and xs[-1] < traces.end_s:
@@ -184,7 +184,7 @@ def _draw_logic(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int)
 
 
 def _draw_errors(axis: Any, tasks: Sequence[str], traces: Traces, width_px: int) -> None:
-    """A row for each task, a mark for each error; codes are written where there is room."""
+    """Draw a row for each task, a mark for each error; codes are written where there is room."""
     room = (traces.end_s - traces.start_s) * _LABEL_PX / width_px
     for row, task in enumerate(tasks):
         marks = [mark for mark in traces.errors if mark.task == task]
@@ -240,5 +240,5 @@ def _name_rows(axis: Any, names: Sequence[str]) -> None:
 
 
 def _plain(text: str) -> str:
-    """A text that is drawn as it stands: no formulas, nothing unprintable."""
+    """Return a text that matplotlib draws literally: no formulas, nothing unprintable."""
     return printable(text).replace("$", r"\$")

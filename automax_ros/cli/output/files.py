@@ -1,4 +1,4 @@
-"""The tables that a subcommand writes: opened so that what goes wrong is reported, and never over what is read."""
+"""Files that a subcommand writes: errors are reported, and an input is never overwritten."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from automax_ros.recordings.mcap.whole_file import atomic_write, held_open, is_d
 
 @contextmanager
 def opened_for_writing(path: Path | None) -> Iterator[TextIO]:
-    """Open a table for writing, standard output without a path.
+    """Open a table for writing; without a path, standard output.
 
     Raises:
         UsageError: it cannot be written.
@@ -36,7 +36,7 @@ def require_writable(path: Path) -> None:
     """Refuse a file that could not be written, before the work for it begins.
 
     Raises:
-        UsageError: it is a folder, there is no such folder for it, or one of both must not be written.
+        UsageError: it is a folder, its folder does not exist, or there is no write permission for one of both.
     """
     if not path.parent.is_dir():
         raise UsageError(f"{path} cannot be written: there is no folder {path.parent}")
@@ -51,12 +51,12 @@ def require_writable(path: Path) -> None:
 
 @contextmanager
 def held_for_writing(path: Path | None) -> Iterator[None]:
-    """Keep a pipe open from before the work for it until that is written; nothing to do for a regular file.
+    """Keep a pipe open from before the work until its result is written; a regular file needs nothing.
 
-    Whoever reads a pipe must do so before the work begins (decision): hours of a run are not lost at its end.
+    A pipe must have a reader before the work begins (decision): hours of a run are not lost at its end.
 
     Raises:
-        UsageError: nobody reads it, or it cannot be written.
+        UsageError: the pipe has no reader, or it cannot be written.
     """
     with ExitStack() as held:
         if path is not None:
@@ -72,7 +72,7 @@ def require_folder(key: str, folder: Path) -> None:
     """Refuse a folder that could not be made or written into, before the work for it begins.
 
     Raises:
-        UsageError: something else stands there or above it, or it must not be written.
+        UsageError: the path or a parent is not a folder, or there is no write permission.
     """
     try:
         there = next(place for place in (folder, *folder.absolute().parents) if place.exists() or place.is_symlink())
@@ -85,7 +85,7 @@ def require_folder(key: str, folder: Path) -> None:
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
-    """Write data as JSON, as a whole or not at all where the file is a regular one; a link stays a link (decision).
+    """Write data as JSON, a regular file as a whole or not at all; a link stays a link (decision).
 
     Raises:
         UsageError: it cannot be written.
@@ -94,7 +94,7 @@ def write_report(path: Path, report: Mapping[str, Any]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text, as a whole or not at all where the file is a regular one; a link stays a link.
+    """Write a text, a regular file as a whole or not at all; a link stays a link.
 
     Raises:
         UsageError: it cannot be written.
@@ -117,7 +117,7 @@ def require_picture_file(path: Path) -> None:
     """Refuse a picture that could not be written, before the work for it begins.
 
     Raises:
-        UsageError: its suffix names no format of pictures, or there is no such folder.
+        UsageError: its suffix is not that of a picture format, or it is not writable (``require_writable``).
     """
     if path.suffix.lower() not in PICTURE_FORMATS:
         raise UsageError(f"{path} names no format of pictures", f"end it with {', '.join(PICTURE_FORMATS)}")
@@ -125,10 +125,10 @@ def require_picture_file(path: Path) -> None:
 
 
 def require_different_files(read: Mapping[str, Path], written: Mapping[str, Path | None]) -> None:
-    """Refuse to write over what is read, or twice to one file; the keys are the arguments' names.
+    """Refuse to overwrite an input, or to write two outputs to one file; the keys are the arguments' names.
 
     Raises:
-        UsageError: two arguments mean one file.
+        UsageError: two arguments name one file.
     """
     outputs = {key: path for key, path in written.items() if path}
     for key, path in outputs.items():
@@ -138,7 +138,7 @@ def require_different_files(read: Mapping[str, Path], written: Mapping[str, Path
 
 
 def _is_same_file(one: Path, other: Path) -> bool:
-    """Whether two paths lead to one regular file, or would if it existed; two times /dev/null does no harm."""
+    """Whether two paths lead to one regular file, or would if it existed; /dev/null may be given twice."""
     try:
         if one.exists() and other.exists():
             return one.is_file() and one.samefile(other)

@@ -1,4 +1,4 @@
-"""A prompt at which a person types commands: line editing, history and completion; Ctrl-C gives up a line."""
+"""A command prompt with line editing, history and completion; Ctrl-C discards the line."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from dataclasses import dataclass
 from types import FrameType
 
 _DELIMITERS = " \t\n=:"
-"""What ends a word for completion: not the type characters of names."""
+"""Characters that end a word for completion; the type characters of names do not."""
 
 
 @dataclass
 class Interrupt:
-    """Ctrl-C: at the prompt it gives the line up, while something goes on it is noted."""
+    """Ctrl-C: at the prompt it discards the line, during an operation it is recorded."""
 
     pending: bool = False
     _prompting: bool = False
 
     def taken(self) -> bool:
-        """Return whether Ctrl-C came since the last call."""
+        """Return whether Ctrl-C has come since the last call."""
         pending, self.pending = self.pending, False
         return pending
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Take SIGINT while the block lasts."""
+        """Handle SIGINT while the block lasts."""
 
         def note(_: int, __: FrameType | None) -> None:
             if self._prompting:
@@ -41,7 +41,7 @@ class Interrupt:
 
     @contextmanager
     def prompting(self) -> Iterator[None]:
-        """Let SIGINT raise KeyboardInterrupt while the block lasts."""
+        """Make SIGINT raise KeyboardInterrupt while the block lasts."""
         self._prompting, self.pending = True, False
         try:
             yield
@@ -50,7 +50,7 @@ class Interrupt:
 
 
 def typed_lines(prompt: str, interrupt: Interrupt) -> Iterator[str]:
-    """Yield the lines that a person types until Ctrl-D; Ctrl-C gives up the present one."""
+    """Yield the typed lines until Ctrl-D; Ctrl-C discards the present one."""
     while True:
         try:
             with interrupt.prompting():

@@ -1,4 +1,4 @@
-"""A progress bar for work that lasts: only on a terminal, and only after two seconds."""
+"""Terminal output: diagnostics in colour, a status line, and a progress bar for work that takes over two seconds."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _HINT = "  hint:"
 
 
 def wants_colour(stream: TextIO) -> bool:
-    """Whether a stream is a terminal that shows colours, and the person has not set NO_COLOR."""
+    """Whether a stream is a terminal that shows colours, and NO_COLOR is not set."""
     return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
 def rewrites_lines(stream: TextIO) -> bool:
-    """Whether a stream is a terminal that can write its last line again."""
+    """Whether a stream is a terminal that can rewrite its last line."""
     return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 
 def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, stream: TextIO) -> None:
-    """Print diagnostics of one text in the order of their places, in colour if the stream wants it."""
+    """Print diagnostics of one text in the order of their places, in colour if the stream supports it."""
     colour = wants_colour(stream)
     for item in in_order(diagnostics):
         text = visible(render(item, source))
@@ -41,9 +41,9 @@ def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, str
 
 
 def tell_warnings(findings: Iterable[tuple[SourceText, Sequence[Diagnostic]]], of: str, path: Path) -> None:
-    """Say on standard error how many warnings there are, and that `automax check` of ``path`` shows them.
+    """Print on standard error how many warnings there are, and that `automax check` of ``path`` shows them.
 
-    A command that is used again and again does not print them each time; ``of`` says whose they are.
+    A command that is used repeatedly does not print them each time; ``of`` names what they concern.
     """
     number = sum(item.severity is Severity.WARNING for _, diagnostics in findings for item in diagnostics)
     if number:
@@ -73,10 +73,10 @@ _PLAIN_PERIOD_NS = 5 * NS_PER_S
 
 
 class StatusLine:
-    """Shows parts of a line on standard output when it is time to; ``began_ns`` is when it was made (monotonic)."""
+    """A status line on standard output, shown at intervals; ``began_ns`` is when it was created (monotonic clock)."""
 
     def __init__(self) -> None:
-        """Begin; nothing is printed before the first line is due."""
+        """Create the status line; nothing is printed before the first one is due."""
         self._terminal = rewrites_lines(sys.stdout)
         self._period_ns = _TERMINAL_PERIOD_NS if self._terminal else _PLAIN_PERIOD_NS
         self.began_ns = self._last_ns = time.monotonic_ns()
@@ -92,7 +92,7 @@ class StatusLine:
         return passed
 
     def show(self, parts: Sequence[str]) -> None:
-        """Show a line; on a narrow terminal the last parts are left out."""
+        """Show the line; on a narrow terminal the last parts are omitted."""
         if self._terminal:
             columns = shutil.get_terminal_size().columns
             line = fitting(parts, columns - 1)
@@ -103,25 +103,25 @@ class StatusLine:
         sys.stdout.flush()
 
     def message(self, text: str) -> None:
-        """Print a line of its own."""
+        """Print a separate line."""
         self.clear()
         print(text, flush=True)
 
     def clear(self) -> None:
-        """Take the line away."""
+        """Erase the line."""
         if self._drawn:
             write_control(sys.stdout, erasing(self._drawn, shutil.get_terminal_size().columns))
             self._drawn = 0
 
 
 def erasing(drawn: int, columns: int) -> str:
-    """Return what erases a line of ``drawn`` characters, which a terminal made narrower has wrapped into several."""
+    """Return the sequence that erases a line of ``drawn`` characters, even one that a narrower terminal has wrapped."""
     rows_above = max(0, drawn - 1) // max(1, columns)
     return f"\r\x1b[{rows_above}A\x1b[J" if rows_above else "\r\x1b[K"
 
 
 def fitting(parts: Sequence[str], width: int) -> str:
-    """Return as many parts as a line holds: none is cut, for half a number is a wrong one."""
+    """Return as many parts as fit on a line; no part is cut, for half a number is a wrong one."""
     line = parts[0][: max(0, width)]
     for part in parts[1:]:
         if len(line) + 2 + len(part) > width:
@@ -137,7 +137,7 @@ _SHARES = 1000
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
-    """Shows on standard error how much of ``total`` is done; nothing where that is not a terminal or ``total`` is 0."""
+    """Shows on standard error how much of ``total`` is done; nothing if that is not a terminal or ``total`` is 0."""
 
     def __init__(self, title: str, total: int, *, wanted: bool = True) -> None:
         self._title = title
@@ -148,7 +148,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         self._drawn = 0
 
     def show(self, done: int) -> None:
-        """Tell how much is done by now."""
+        """Show how much is done by now."""
         if not self._wanted:
             return
         now = time.monotonic()
@@ -159,7 +159,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Take the bar away."""
+        """Erase the bar."""
         if self._drawn:
             write_control(sys.stderr, erasing(self._drawn, shutil.get_terminal_size().columns))
             sys.stderr.flush()
@@ -178,6 +178,6 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
 @contextmanager
 def share_shown(title: str) -> Iterator[Callable[[float], None]]:
-    """Return what takes the share that is done, 0 to 1, and shows it as a progress bar."""
+    """Yield a function that shows the share that is done, 0 to 1, as a progress bar."""
     with ProgressBar(title, _SHARES) as bar:
         yield lambda share: bar.show(int(share * _SHARES))

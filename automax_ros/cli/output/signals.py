@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and SIGHUP as a flag that a loop looks at, or as an exception: a command ends cleanly with both."""
+"""Ctrl-C, SIGTERM and SIGHUP as a flag that a loop checks, or as an exception: a command ends cleanly with both."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from typing import Any
 from automax_ros.cli.early import EARLY
 
 _SIGNALLED = 128
-"""Exit code of a command that a signal has ended, less the signal's number: what the shell adds."""
+"""The shell's offset: the exit code of a command ended by a signal is this plus the signal's number."""
 
 
 class WorkInterrupted(BaseException):
-    """A signal came during work that is not worth its end: not an error, so that nobody takes it for one."""
+    """Raised when a signal interrupts work that may be abandoned. Not an Exception, so handlers do not catch it."""
 
 
 @dataclass
 class StopRequest:
-    """Whether a signal has asked for the end, and the first one's number."""
+    """Whether a signal has requested the end, and the number of the first one."""
 
     requested: bool = False
     number: int = 0
@@ -31,20 +31,20 @@ class StopRequest:
 
     @property
     def code(self) -> int:
-        """The exit code of a command that a signal has kept from its work."""
+        """The exit code of a command that a signal ended before its work."""
         return _SIGNALLED + self.number
 
     @contextmanager
     def cut_short(self) -> Iterator[None]:
-        """Let a signal end the block at once, by CutShort: for long work whose result alone matters.
+        """Interrupt the block at once when a signal comes: for long work of which only the result matters.
 
         Raises:
-            CutShort: a signal has come, in the block or before.
+            WorkInterrupted: a signal has come, in the block or before.
         """
         before = sys.unraisablehook
 
         def quiet(what: Any) -> None:
-            # Raised where nobody can take it, as while an object is deleted, the request is still noted.
+            # Raised where it cannot be caught, such as while an object is deleted; the request is still recorded.
             if not isinstance(what.exc_value, WorkInterrupted):
                 before(what)
 
@@ -59,10 +59,10 @@ class StopRequest:
             sys.unraisablehook = before
 
     def note(self, number: int) -> None:
-        """Take notice of a signal.
+        """Record a signal.
 
         Raises:
-            CutShort: in a ``cut_short`` block, once.
+            WorkInterrupted: in a ``cut_short`` block, once.
         """
         if not self.requested:
             self.requested, self.number = True, number
@@ -73,9 +73,9 @@ class StopRequest:
 
 @contextmanager
 def stop_signals() -> Iterator[StopRequest]:
-    """Note SIGINT, SIGTERM and SIGHUP while the block lasts.
+    """Record SIGINT, SIGTERM and SIGHUP while the block lasts.
 
-    Once one has come, all stay without effect: a second Ctrl-C must not turn the clean end into another.
+    After one has come, all are ignored even after the block: a second Ctrl-C must not interrupt the clean end.
     """
     stop = StopRequest()
 
@@ -92,9 +92,9 @@ def stop_signals() -> Iterator[StopRequest]:
 
 @contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP end the block by SystemExit, as Ctrl-C does by KeyboardInterrupt, so that it cleans up.
+    """Make SIGTERM and SIGHUP raise SystemExit in the block, as Ctrl-C raises KeyboardInterrupt, so that it cleans up.
 
-    A signal that is ignored stays so; outside of the main thread, which alone takes signals, nothing is changed.
+    A signal that is ignored stays ignored; outside of the main thread, the only one with handlers, nothing is changed.
     """
 
     def end(number: int, _: FrameType | None) -> None:

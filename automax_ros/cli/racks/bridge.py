@@ -30,11 +30,11 @@ from automax_ros.drive.circuit.steady import BridgeCase, SteadyState, steady_sta
 KEYS = (
     "mean_current_a", "rms_current_a", "ripple_pp_a", "mean_voltage_v", "zero_current_us", "overlap_deg", "continuous",
 )  # fmt: skip
-"""What --json prints of a steady state."""
+"""Fields of a steady state that --json prints."""
 COLUMNS = ("t_s", "armature_a", "armature_v", "speed_rad_s")
 ROW_NS = 1_000_000
 SHORT_MARGIN_US = 400.0
-"""SCRs of these drives recover in 100 to 400 us."""
+"""Margin below which the report warns: SCRs of these drives recover in 100 to 400 us."""
 
 
 class _Table(Protocol):
@@ -43,7 +43,7 @@ class _Table(Protocol):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax bridge``."""
-    # argparse before 3.14 takes -1e-3 for an option and asks for a number.
+    # argparse before 3.14 mistakes -1e-3 for an option and reports a missing number.
     parser._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
     line = parser.add_argument_group("line")
     line.add_argument("--v-ll", type=number, default=460.0, metavar="V", help="line-to-line voltage, rms (default 460)")
@@ -114,7 +114,7 @@ def _steady(case: BridgeCase, arguments: argparse.Namespace) -> None:
 
 
 def report(case: BridgeCase, state: SteadyState) -> str:
-    """Return the steady state as a drive engineer reads it."""
+    """Return the steady state as text for a drive engineer."""
     ideal = 3 * sqrt(2) / pi * case.v_ll_v * cos(radians(case.alpha_deg)) * (-1 if case.reverse else 1)
     name = f"bridge {2 if case.reverse else 1}, alpha {case.alpha_deg:g} deg (delta {180 - case.alpha_deg:g})"
     ripple = f"rms {state.rms_current_a:.3f} A, ripple {state.ripple_pp_a:.3f} A peak to peak"

@@ -45,7 +45,7 @@ def plot(case: BridgeCase, state: SteadyState, path: Path) -> None:
     try:
         with atomic_write(path) as place:
             figure.savefig(place, dpi=150)
-    except (OSError, ValueError) as error:  # ValueError: a suffix that names no format of pictures
+    except (OSError, ValueError) as error:  # ValueError: the suffix is not that of a picture format
         reason = getattr(error, "strerror", None) or error
         raise UsageError(f"{path} cannot be written: {reason}") from error
 
@@ -79,7 +79,7 @@ def _draw_current(axis: Any, time_ms: list[float], moments: list[Moment], state:
 def _draw_bars(
     axis: Any, time_ms: list[float], sets: list[tuple[int, ...]], numbers: tuple[int, ...], label: str
 ) -> None:
-    """Draw a bar wherever an SCR is in the set of that instant."""
+    """Draw a bar wherever an SCR is in the set of the instant."""
     step = time_ms[1] - time_ms[0]
     for row, number in enumerate(numbers):
         bars: list[tuple[float, float]] = []

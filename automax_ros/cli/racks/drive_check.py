@@ -73,7 +73,7 @@ def _finding(item: Finding) -> list[str]:
 
 
 def records_of(found: Iterable[DriveFindings]) -> list[dict[str, Any]]:
-    """Return the same for JSON; numbers that are not known are null."""
+    """Return the data that describe drives, for JSON; unknown numbers are null."""
     return [
         {
             "drive": drive.name,
@@ -88,7 +88,7 @@ def records_of(found: Iterable[DriveFindings]) -> list[dict[str, Any]]:
 
 
 def _execution(case: DriveCase | None) -> dict[str, str | None]:
-    """Return how the loop's task is executed, and on what Processor; null where there is no such task."""
+    """Return how the current minor loop task is executed, and the model of its Processor; None if there is no task."""
     computing = case.computing if case is not None else None
     if computing is None:
         return {"execution": None, "model": None}
@@ -109,7 +109,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print what was found; what is wrong with the rack goes to the standard error."""
+    """Print the findings; errors of the rack are printed on standard error."""
     config = config_of(arguments.config, allow_outside=arguments.allow_outside)
     if config is None:
         return 1
@@ -127,7 +127,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _programs(config: RackConfig) -> tuple[list[Program], bool]:
-    """Return the tasks without errors, and whether others have some: those are printed."""
+    """Return the tasks without errors, and whether others have errors, which are printed."""
     programs: list[Program] = []
     wrong = False
     for item in check_tasks(config):

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the loads; what is wrong goes to the standard error."""
+    """Print the loads; errors are printed on standard error."""
     rack = load_rack_file(arguments.config, allow_outside=arguments.allow_outside)
     if rack.config is None:
         print_diagnostics(rack.diagnostics, rack.source, sys.stderr)

@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def require_free(output: Path, *, force: bool) -> None:
-    """Refuse a place where no rack file may be written, before the work begins."""
+    """Refuse a path at which no rack file may be written, before the work begins."""
     if output.is_dir():
         raise UsageError(f"{output} is a folder", f"name the file: --output {output / DEFAULT_RACK_FILE}")
     if not is_rack_file(output):
@@ -76,7 +76,7 @@ def require_free(output: Path, *, force: bool) -> None:
 
 
 def write_rack_file(output: Path, text: str, *, force: bool) -> None:
-    """Write the whole file or nothing; without ``force`` never over another that came in between."""
+    """Write the whole file or nothing; without ``force`` never overwrite one that was created meanwhile."""
     try:
         if force:
             with atomic_write(output) as path:
@@ -89,7 +89,10 @@ def write_rack_file(output: Path, text: str, *, force: bool) -> None:
 
 
 def _has_errors(output: Path, drafted: Draft) -> bool:
-    """Print what is wrong with the rack file and its tasks; where commons differ, both tasks' places."""
+    """Print the diagnostics of the rack file and its tasks, and return whether there are errors.
+
+    Where commons differ, the places in both tasks are named.
+    """
     loaded = load(output)
     print_diagnostics(loaded.diagnostics, loaded.source, sys.stderr)
     wrong = has_errors(loaded.diagnostics)

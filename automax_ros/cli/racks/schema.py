@@ -13,7 +13,7 @@ from automax_ros.rackfile.loader import schema as rack_schema
 from automax_ros.scenario.stimuli.schema import schema as stimuli_schema
 
 SCHEMAS = {"rack": rack_schema, "stimuli": stimuli_schema}
-"""The kinds of files, each with what makes its schema."""
+"""The kinds of files, each with the function that returns its schema."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from automax_ros.ros.security.profiles import Enclave
 
 POLICY, KEYSTORE = "policy.xml", "keystore"
-"""What stands in the folder of ``--output``."""
+"""The contents of the folder of ``--output``."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.keystore and arguments.output is None:
         raise UsageError("--keystore needs a folder", "give --output DIR")
     if arguments.discovery is None:
-        arguments.discovery = "off"  # nobody shall see nodes that are only asked
+        arguments.discovery = "off"  # these nodes are only inspected, and not to be discovered
     os.environ.pop("ROS_SECURITY_ENABLE", None)  # the keys of these nodes may not be there yet
     domain = prepare_ros(arguments)
     config = config_of(arguments.config, allow_outside=arguments.allow_outside, quiet=True)
@@ -97,7 +97,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _what_to_do(arguments: argparse.Namespace, enclaves: Sequence[Enclave], domain: int) -> list[str]:
-    """Return what was written, and the commands that go on."""
+    """Return what was written, and the next commands to run."""
     folder = arguments.output
     lines = [f"{folder / POLICY}: {', '.join(enclave.path for enclave in enclaves)}"]
     if not arguments.keystore:

@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _obey_all(session: Session, interrupt: Interrupt) -> bool:
-    """Carry out commands until their end; return whether one of them failed."""
+    """Carry out commands until their end; return whether one of a script failed."""
     interactive = sys.stdin.isatty()
     if interactive:
         edit_lines(lambda text: completions(session, text))

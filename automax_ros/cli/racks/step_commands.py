@@ -1,4 +1,4 @@
-"""The commands of `automax step`: how each is written, and what it does."""
+"""The commands of `automax step`: their usage and their functions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from automax_ros.rack.operate.operations import Operations
 
 @dataclass(frozen=True)
 class Command:
-    """A command: how it is written, what it does, its function, and how many words it takes."""
+    """A command: its usage, its description, its function, and the least and the most words that it takes."""
 
     usage: str
     text: str
@@ -25,7 +25,7 @@ def execute(session: Session, line: str) -> None:
     """Carry out a line: a command and its words; an empty line, or one that begins with #, does nothing.
 
     Raises:
-        Fault: there is no such command, or it cannot be carried out.
+        UserError: there is no such command, or it cannot be carried out.
         OperationRefused: the rack refuses it now.
     """
     name, *words = line.split() or [""]

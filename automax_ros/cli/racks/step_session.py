@@ -1,4 +1,4 @@
-"""What the commands of `automax step` do to a rack that is stepped."""
+"""The session of `automax step`: operations on a stepped rack, and the text that shows it."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from automax_ros.scenario.stepping.variables import Variable
 MOST_CHANGES = 20
 """How many changed variables are listed after a step (decision); ``watch`` chooses others."""
 AROUND = 3
-"""Lines shown before and after one."""
+"""Lines shown before and after the marked line."""
 _NUMBER = re.compile(r"\s*([0-9]{1,9})\b")
 
 
 def place_text(rack: Rack, task: str, line: int) -> str:
-    """Return where a rack is: its time, and the line before which a scan is held."""
+    """Return the position of a rack: its time, and the line before which a scan is held."""
     place = f", {task} before line {line}" if task else ""
     return f"{seconds_text(rack.now_ns)} s{place}"
 
 
 def halt_lines(halt: Halt) -> list[str]:
-    """Return why a rack halts, where that is news."""
+    """Return why a rack halted, unless it is the normal end of a step."""
     lines = []
     if halt.why is Why.LINE and halt.line:
         lines.append(f"at {halt.task}:{halt.line}")
@@ -74,12 +74,12 @@ _DEFAULT_GO_NS = 1 << 62
 
 
 class CommandFault(UserError):
-    """A command cannot be carried out as it was typed."""
+    """A command cannot be carried out as typed."""
 
 
 @dataclass
 class Session:
-    """One rack under a person's hand; ``tell`` prints a line. ``over`` is TRUE after ``quit``."""
+    """The session with one stepped rack; ``tell`` prints a line. ``over`` is TRUE after ``quit``."""
 
     stepper: Stepper
     tell: Callable[[str], None]
@@ -87,7 +87,7 @@ class Session:
     _watched: dict[str, Variable] = field(default_factory=dict)
 
     def step(self, words: list[str], one: Callable[[str], Halt]) -> None:
-        """Repeat a step of a task as often as is wanted, until something else halts the rack."""
+        """Repeat a step of a task the given number of times, or until something else halts the rack."""
         task = next((word for word in words if not word.isdecimal()), "")
         times = self._times([word for word in words if word != task])
 
@@ -102,17 +102,17 @@ class Session:
         self.move(all_of_them)
 
     def ticks(self, words: list[str]) -> None:
-        """Go on for ticks of the first Processor."""
+        """Run for a number of ticks of the first Processor."""
         times = self._times(words)
         self.move(lambda: self.stepper.ticks(times))
 
     def move(self, call: Callable[[], Halt]) -> None:
-        """Let the rack go on, and say what its variables were and are."""
+        """Run the rack by ``call``, and print its variables before and after."""
         before = self.values()
         self.told(call(), before)
 
     def told(self, halt: Halt, before: dict[str, Value]) -> None:
-        """Say where the rack halts, and what its variables were and are."""
+        """Print where the rack halted, and its variables before and after."""
         for task in self.stepper.rack.tasks:
             while task.printed:
                 self.tell(f"{task.name}: {printable(task.printed.popleft())}")
@@ -125,25 +125,25 @@ class Session:
             self.source([halt.task], around=0)
 
     def values(self) -> dict[str, Value]:
-        """Return the watched variables, or without any all simple ones."""
+        """Return the values of the watched variables, or of all simple ones if none is watched."""
         shown = self._watched.values() or self._all()
         return {variable.label: variable.read() for variable in shown}
 
     def watch(self, words: list[str]) -> None:
-        """Show these after each step; without any, list them."""
+        """Show these variables after each step, too, and list all watched ones."""
         for word in words:
             variable = self.stepper.variables.find(word)
             self._watched[variable.label] = variable
         self.show(list(self._watched))
 
     def unwatch(self, words: list[str]) -> None:
-        """Show these no longer, or none of them."""
+        """Stop showing these variables, or all if none is given."""
         labels = [self.stepper.variables.find(word).label for word in words] or list(self._watched)
         for label in labels:
             self._watched.pop(label, None)
 
     def show(self, words: list[str]) -> None:
-        """Print values: of variables, or of all simple variables of a task."""
+        """Print the values of variables, or of all simple variables of a task."""
         tasks = {task.name for task in self.stepper.rack.tasks}
         found: list[Variable] = []
         for word in words:
@@ -186,7 +186,7 @@ class Session:
         self.stepper.rack.adjust.unforce(None if words in (["all"], []) else words)
 
     def between_scans(self) -> None:
-        """Refuse what must not fall into a scan (decision: values from outside come between two scans, as always)."""
+        """Refuse a command within a held scan (decision: values from outside come between two scans, as always)."""
         task, line = self.stepper.place
         if task:
             raise CommandFault(f"{task} is held before line {line}: a scan must end first", "write: scan")
@@ -217,7 +217,7 @@ class Session:
             self.tell(text)
 
     def tasks(self) -> None:
-        """Print the tasks with what they do."""
+        """Print the tasks with their status, scans and errors."""
         rack = self.stepper.rack
         rows = [["  task", "module", "status", "scans", "errors"]]
         for module in rack.task_modules:
@@ -234,23 +234,23 @@ class Session:
                 self.tell(f"  {task.name}: {entry.describe()}")
 
     def go(self, words: list[str]) -> None:
-        """Go on, for a time if one is given."""
+        """Run the rack, for a time if one is given."""
         for_ns = self._seconds(words[0]) if words else _DEFAULT_GO_NS
         self.move(lambda: self.stepper.go(for_ns))
 
     def until(self, words: list[str]) -> None:
-        """Go on to a rack time."""
+        """Run the rack to a rack time."""
         time_ns = self._seconds(words[0])
         if time_ns < self.stepper.rack.now_ns:
             raise CommandFault(f"{words[0]} s has passed")
         self.move(lambda: self.stepper.until(time_ns))
 
     def end(self) -> None:
-        """Leave."""
+        """End the session."""
         self.over = True
 
     def _all(self) -> Iterator[Variable]:
-        """Yield the simple commons, and the own variables of the task that is held."""
+        """Yield the simple commons, and the locals of the held task, or of all tasks if none is held."""
         rack, (task, _) = self.stepper.rack, self.stepper.place
         for variable in rack.config.declared:
             if not variable.is_array:

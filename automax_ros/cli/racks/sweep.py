@@ -43,12 +43,12 @@ from automax_ros.sweep.tables import records
 
 
 def record_run(plan: Plan, point: Point, folder: Path, should_stop: Callable[[], bool]) -> list[Row]:
-    """Run a point, record it into a new folder, and return its row, which is that of the run without recording.
+    """Run a point, record it into a new folder, and return its row, the same as without recording.
 
-    There is no row where ``should_stop`` has ended the run; what is recorded by then is a whole recording.
+    There is no row if ``should_stop`` has ended the run; the recording up to then is complete.
 
     Raises:
-        BagError: it cannot be recorded.
+        BagError: the run cannot be recorded.
     """
 
     def attend(rack: Rack) -> Callable[[], None]:
@@ -70,9 +70,9 @@ def record_run(plan: Plan, point: Point, folder: Path, should_stop: Callable[[],
 
 _T = TypeVar("_T")
 USUAL_DURATION_NS = 10 * NS_PER_S
-"""How long a run takes without ``--duration`` (decision)."""
+"""Duration of a run without ``--duration`` (decision)."""
 _FEW = 16
-"""Fewer runs than these are done by this process alone unless ``--jobs`` is given (decision: they end as soon)."""
+"""Fewer runs than this are done by this process alone unless ``--jobs`` is given (decision: they end as soon)."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -121,7 +121,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class _Sweep:
-    """What is to be done: ``wanted`` says what is told of it."""
+    """A sweep to be carried out; ``wanted`` determines its output."""
 
     plan: Plan
     points: list[Point]
@@ -150,7 +150,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
-    """Return what is to be done, None where the rack has errors; all values are looked at."""
+    """Return the sweep that the arguments describe, None where the rack has errors; all values are checked."""
     where = where_of(arguments)
     config = config_of(arguments.config, allow_outside=arguments.allow_outside)
     if config is None:
@@ -200,7 +200,7 @@ def _carry_out(sweep: _Sweep, arguments: argparse.Namespace, stop: StopRequest) 
 
 
 def _rows(sweep: _Sweep, stop: StopRequest) -> list[Row]:
-    """Return the rows that could be had before a signal came, in their order."""
+    """Return the rows of all runs that ended before a signal came, in their order."""
     found: dict[int, Row] = {}
     with ProgressBar("sweep", len(sweep.points)) as bar:
 
@@ -227,7 +227,7 @@ def _varied(rack: Rack, texts: list[str]) -> list[Varied]:
 
 
 def _points(varied: list[Varied], arguments: argparse.Namespace) -> list[Point]:
-    """Return the values of each run; without ``--vary`` there is one run of the rack as it is."""
+    """Return the values of each run; without ``--vary`` there is one run of the unchanged rack."""
     if arguments.sample is None:
         if arguments.seed is not None:
             raise UsageError("--seed belongs to --sample")
@@ -245,10 +245,10 @@ def _points(varied: list[Varied], arguments: argparse.Namespace) -> list[Point]:
 
 
 def _read(option: str, read: Callable[[], _T]) -> _T:
-    """Return what an option says.
+    """Return the value of an option, which ``read`` parses.
 
     Raises:
-        UsageError: it cannot be read.
+        UsageError: the option is wrong.
     """
     try:
         return read()

@@ -1,4 +1,4 @@
-"""What a sweep tells: the best runs on the terminal, a folder with tables, facts and a picture."""
+"""The output of a sweep: the best runs on the terminal, a folder with tables, facts and a picture."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from automax_ros.sweep.sweeping import Row, best_rows
 from automax_ros.sweep.tables import write_csv, write_npz
 
 MOST_SHOWN = 10
-"""Best runs that are shown (decision)."""
+"""Number of best runs that are shown (decision)."""
 _MOST_FAULTS = 3
 _WAYS = {"min": False, "max": True}
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What was asked for: ``installed`` is the number of what the rack has installed, ``best`` that of a measure."""
+    """The request: ``installed`` is the fingerprint of the rack's installation, ``best`` the index of a measure."""
 
     arguments: argparse.Namespace
     installed: int
@@ -44,7 +44,7 @@ class Wanted:
 def best_of(
     text: str | None, config: RackConfig, measures: Sequence[Measure], duration_ns: int
 ) -> tuple[Measure, bool]:
-    """Return which measure says what is best, and whether its greatest value does.
+    """Return the measure by which runs are compared, and whether its greatest value is the best.
 
     Raises:
         UsageError: the text is not ``min MEASURE`` or ``max MEASURE``.
@@ -63,7 +63,7 @@ def best_of(
 
 @contextmanager
 def prepared(folder: Path | None) -> Iterator[None]:
-    """Make a folder for what comes of the work in the block; one that is still empty after a failure is taken away.
+    """Create a folder for the results of the block; if the block fails and the folder is empty, remove it.
 
     Raises:
         UsageError: it cannot be made, or has files already.
@@ -84,14 +84,14 @@ def prepared(folder: Path | None) -> Iterator[None]:
         yield
     except BaseException:
         if made:
-            with suppress(OSError):  # something of it was written
+            with suppress(OSError):  # the folder is not empty
                 folder.rmdir()
         raise
 
 
 @dataclass(frozen=True)
 class Output:
-    """The rows of a sweep of ``count`` runs with all that is told of them."""
+    """The rows of a sweep of ``count`` runs, and their output."""
 
     plan: Plan
     wanted: Wanted
@@ -104,7 +104,7 @@ class Output:
         return best_rows(self.rows, self.wanted.best, greatest=self.wanted.greatest)
 
     def repeat(self, row: Row) -> str:
-        """Return the command that runs a row alone, with the same measures."""
+        """Return the command that repeats the run of a row alone, with the same measures."""
         arguments = self.wanted.arguments
         words = ["automax", "sweep", str(arguments.config)]
         for quantity, value in zip(self.plan.quantities, row.point, strict=True):
@@ -119,7 +119,7 @@ class Output:
         """Write runs.csv, runs.npz, sweep.json, and sweep.png where there is something to draw.
 
         Raises:
-            UsageError: one cannot be written.
+            UsageError: a file cannot be written.
         """
         stream = io.StringIO()
         write_csv(self.plan, self.rows, self.repeat, stream)
@@ -154,7 +154,7 @@ class Output:
 
 
 def print_best(output: Output) -> None:
-    """Print the best runs, the command of the first, and what went wrong."""
+    """Print the best runs, the command that repeats the best, and the faults."""
     best, plan, wanted = output.best, output.plan, output.wanted
     if best:
         headings = ["run", *(item.label for item in plan.quantities), *(item.label for item in plan.measures)]

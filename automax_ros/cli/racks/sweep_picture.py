@@ -17,17 +17,17 @@ from automax_ros.sweep.run import Plan
 from automax_ros.sweep.sweeping import Row
 
 MOST_LANES = 8
-"""Most measures, and most quantities, that are drawn (decision)."""
+"""Greatest number of measures, and of quantities, that are drawn (decision)."""
 _WIDTH_IN, _LANE_IN, _MAP_IN, _CELL_IN = 9.0, 2.2, 4.5, 2.4
 _MOST_TICKS = 20
 _COLOUR, _BEST, _FONT = "#1f4e9c", "#c1272d", 8
 _LETTERS_AN_INCH, _LEAST_LETTERS = 14.0, 12
-"""How many letters of that size an inch holds, and the shortest line of a label."""
+"""Letters of that size per inch, and the shortest line of a label, in letters."""
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """A column of the table as numbers: of texts, which of ``texts`` each is."""
+    """A column of the table as numbers; for texts, the indices in ``texts``."""
 
     label: str
     numbers: list[float]
@@ -39,7 +39,7 @@ class _Axis:
 
 
 def draw(plan: Plan, rows: Sequence[Row], best: Sequence[Row], path: Path) -> None:
-    """Draw the rows; where nothing varies there is no picture. The same rows give the same bytes.
+    """Draw the rows, unless nothing varies. The same rows give the same bytes.
 
     Raises:
         UsageError: matplotlib is missing, or the file cannot be written.
@@ -142,11 +142,11 @@ def _name(axis: Any, across: _Axis, up: _Axis) -> None:
 
 
 def _folded(text: str, inches: float) -> str:
-    """A label in as many lines as it needs to be no longer than its axis."""
+    """Return a label in as many lines as it needs to be no longer than its axis."""
     lines = textwrap.wrap(text, max(_LEAST_LETTERS, int(inches * _LETTERS_AN_INCH)), break_on_hyphens=False)
     return "\n".join(map(_plain, lines))
 
 
 def _plain(text: str) -> str:
-    """A text that is drawn as it stands: no formulas."""
+    """Return a text that matplotlib draws literally, without formulas."""
     return text.replace("$", r"\$")

@@ -10,7 +10,7 @@ ACTIONS = {
     "info": "tell what a recording holds",
     "repair": "save what is sound of a damaged recording",
 }
-"""What can be done and its line of help; the module ``bag_ACTION`` of this folder does it."""
+"""The actions with their lines of help; the module ``bag_ACTION`` of this folder implements each."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

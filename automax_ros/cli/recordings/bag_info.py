@@ -22,7 +22,7 @@ from automax_ros.messages.types.messages import Operation
 from automax_ros.recordings.info.info import BagInfo, TaskFacts, bag_info, task_facts
 
 _WALL_CLOCK_NS = 10**9 * NS_PER_S
-"""Stamps of a run from here on are times of day (September 2001); simulated runs begin at 0."""
+"""Earliest wall-clock stamp (September 2001); simulated runs begin at 0."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read the recording and tell what it holds."""
+    """Read the recording and print its contents."""
     with share_shown("reading") as progress:
         info = bag_info(arguments.bag, check=arguments.check, progress=progress)
     content = as_data(info, task_facts(info), checked=arguments.check)
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def as_data(info: BagInfo, facts: dict[str, TaskFacts], *, checked: bool) -> dict[str, Any]:
-    """Return what ``--json`` prints. Times are seconds; what the recording does not tell is null."""
+    """Return the data that ``--json`` prints. Times are in seconds; what the recording does not contain is null."""
     table = info.table
     return {
         "bag": str(info.path),
@@ -160,7 +160,7 @@ def _clock(info: BagInfo) -> str | None:
 
 
 def _run_s(info: BagInfo) -> list[float] | None:
-    """The part of the run that is recorded: seconds from the start of the run."""
+    """Return begin and end of the recorded part, in seconds from the start of the run."""
     if info.table is None or info.first_stamp is None or info.last_stamp is None:
         return None
     return [(stamp - info.table.stamp) / NS_PER_S for stamp in (info.first_stamp, info.last_stamp)]

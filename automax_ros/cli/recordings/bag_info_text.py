@@ -1,4 +1,4 @@
-"""The text of ``automax bag info``: tables for the person, made of what ``--json`` prints."""
+"""The text of ``automax bag info``: tables of the data that ``--json`` prints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from automax_ros.core.text import count_of, printable, table
 
 _MOST_ROWS = 100
-"""Longest table that is printed whole; ``--json`` has it all."""
+"""Most rows of a table that are printed; ``--json`` has all of them."""
 _MOST_CELL = 60
 
 
@@ -133,7 +133,7 @@ _GAPS = "  a replay goes on from the next image of memory and the next state of 
 
 
 def _section(title: str, rows: Sequence[Sequence[str]]) -> list[str]:
-    """A table under a title, its columns aligned; nothing without rows."""
+    """Return a table under a title, its columns aligned; nothing without rows."""
     if not rows:
         return []
     shown = [[_cut(cell, _MOST_CELL + 40) for cell in row] for row in rows[: _MOST_ROWS + 1]]
@@ -153,7 +153,7 @@ def _seconds(value: float) -> str:
 
 
 def _size(count: int) -> str:
-    """A number of bytes as a person reads it."""
+    """Return a number of bytes with a suitable unit."""
     value, units = float(count), ["bytes", "KiB", "MiB", "GiB", "TiB"]
     while value >= 1024 and len(units) > 1:
         value /= 1024

@@ -20,7 +20,7 @@ from automax_ros.recordings.repair.repairing import FileReport, RepairReport, re
 
 _STEPS = 1000
 _EARLIEST_WALL_NS = 10**9 * NS_PER_S
-"""Runs that began before 2001 ran in simulated time, which begins at 0."""
+"""Earliest wall-clock stamp (September 2001); earlier stamps are simulated time, which begins at 0."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Repair the recording and tell what was lost."""
+    """Repair the recording and print what was lost."""
     with ProgressBar("repairing", _STEPS) as bar:
         report = repair(arguments.bag, arguments.output, lambda share: bar.show(round(share * _STEPS)))
     print(json.dumps(_data(report), indent=2) if arguments.json else _text(report))

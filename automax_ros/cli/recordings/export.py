@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _written(arguments: argparse.Namespace, as_numpy: bool, progress: Progress) -> int:
     table = _table(arguments, progress)
     if as_numpy:
-        from automax_ros.recordings.tables.export_npz import write_npz  # NumPy takes its time to load
+        from automax_ros.recordings.tables.export_npz import write_npz  # NumPy takes a while to load
 
         return write_npz(arguments.bag, table, arguments.output)
     return write_csv(table, arguments.output)

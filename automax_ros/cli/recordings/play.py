@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _survey(bag: Path, begin: int | None, end: int | None, stop: StopRequest) -> PlayableRecording | None:
-    """Read the recording once, so that nothing is sent of one that is damaged; None if a signal comes."""
+    """Read the recording once, so that none of a damaged one is played; None if a signal comes."""
     with ProgressBar(f"reading {bag.name}", _PERMILLE) as bar:
         found = survey(bag, begin, end, lambda done: bar.show(int(_PERMILLE * done)), lambda: stop.requested)
     return None if stop.requested else found
@@ -109,7 +109,11 @@ def _play(
 
 @contextmanager
 def _locks(found: PlayableRecording, renaming: Renaming, domain: int) -> Iterator[None]:
-    """Keep racks of these names from starting here meanwhile; refuse where one runs."""
+    """Lock the names of these racks on this host while the block lasts.
+
+    Raises:
+        UsageError: a rack of one of the names runs, or a name cannot be locked.
+    """
     from contextlib import ExitStack
 
     from automax_ros.ros.setup.lock import InstanceLock, LockError, RackAlreadyRuns
@@ -131,7 +135,7 @@ _LIVE_HINT = "stop it, play elsewhere with --namespace, or mix both with --force
 
 
 class _Show:
-    """One playback as the person sees it."""
+    """Makes one playback and shows its progress."""
 
     def __init__(self, found: PlayableRecording, player: Player, stop: StopRequest, domain: int) -> None:
         self._found, self._player, self._stop, self._domain = found, player, stop, domain
@@ -166,7 +170,7 @@ class _Show:
         return 0
 
     def _tell_skipped(self) -> int:
-        """Name the topics that cannot be played, and return how many can."""
+        """Print the topics that cannot be played, and return how many can."""
         faults = [topic for topic in self._found.topics.values() if topic.fault]
         told = [topic for topic in faults if topic.fault != NOT_CHOSEN]
         for topic in told[:_SKIPPED_NAMED]:
@@ -211,7 +215,7 @@ def _rate(text: str) -> float:
 
 
 def _placed(spaces: Collection[str], ros: RosArguments) -> str | None:
-    """Return the namespace to play into where ROS arguments give one: in it, under the rack's own name (decision)."""
+    """Return the namespace to play into if ROS arguments give one: in it, under the rack's own name (decision)."""
     if not ros.namespace:
         return None
     own = next(iter(spaces)).rpartition("/")[2] if len(spaces) == 1 else ""

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 DEFAULT_WAIT_S = "10"
 _PATIENCE_S = 3.0
-"""A rack that is gone for so long is reported."""
+"""A rack that has been absent from the graph this long is reported, s."""
 _GAPS_SHOWN = 20
 
 
@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record until Ctrl-C, the duration has passed or the rack starts again.
+    """Record until Ctrl-C, the end of the duration or a restart of the rack.
 
     1 where recording broke off or ended by itself, or holds nothing (decision: a script must see that).
     """
@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Storing:
-    """How the recording is stored, and the tasks that the person named."""
+    """Storage options of the recording, and the tasks named by ``--tasks``."""
 
     storage: StorageOptions
     split_ns: int
@@ -111,7 +111,7 @@ class _Storing:
 
 
 class _Session:
-    """One recording as the person sees it."""
+    """Makes one recording and shows its progress."""
 
     def __init__(self, recorder: LiveRecorder, space: str, domain: int, stop: StopRequest) -> None:
         self._recorder, self._space, self._domain, self._stop = recorder, space, domain, stop
@@ -171,7 +171,7 @@ class _Session:
         )
 
     def _files(self, own: list[RackFile]) -> list[RackFile]:
-        """Return the files that run, from the rack itself if it offers them, else from the YAML file that was named."""
+        """Return the files that run, as the rack offers them, else those of the given YAML file."""
         try:
             offered = self._recorder.files(lambda: self._stop.requested)
         except RackFilesError as error:
@@ -231,7 +231,7 @@ class _Session:
         self._line.show([*parts, count_of(len(recording.gaps), "gap")])
 
     def _look_for_rack(self) -> None:
-        """Tell once when the rack has left the graph, and once when it is back."""
+        """Report once when the rack has left the graph, and once when it is back."""
         now = time.monotonic()
         if now < self._next_presence:
             return
@@ -287,7 +287,7 @@ class _Session:
 
 
 def _rack(text: str, ros: RosArguments) -> tuple[str, list[RackFile], RackConfig | None]:
-    """Return the namespace with its slash, and files and configuration where RACK is a YAML file."""
+    """Return the namespace with its slash, and the files and the configuration if RACK is a YAML file."""
     if not names_file(text):
         return space_of(text, ros), [], None
     config = config_of(Path(text))

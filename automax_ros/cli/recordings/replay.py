@@ -32,9 +32,9 @@ _TRUNCATED, _NO_RECORDING = "AMX6812", "AMX6810"
 
 
 _NS_A_BYTE = 20_000
-"""How much time a byte of a recording stands for, about: 50 kB are a second of an example rack (decision)."""
+"""Run time per byte of a recording, ns, about: 50 kB are a second of an example rack (decision)."""
 _MOST_COUNTS = 1e19
-"""No two values of a variable lie further apart."""
+"""Greatest possible difference between two values of a variable."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -144,7 +144,7 @@ def _options(arguments: argparse.Namespace) -> ReplayOptions:
 
 
 def _expected_ns(bag: Path) -> int:
-    """Return about how long a recording is, by its size; 0 for one that cannot be read."""
+    """Return the approximate duration of a recording, ns, by its size; 0 for one that cannot be read."""
     files = list(bag.glob("*.mcap")) if bag.is_dir() else [bag]
     return sum(file.stat().st_size for file in files if file.is_file()) * _NS_A_BYTE
 
@@ -170,14 +170,14 @@ def _source(name: str, path: Path) -> SourceText:
 
 
 def _require_replayed(options: ReplayOptions, new: dict[str, SourceText]) -> None:
-    """Refuse a new source for a task that --only leaves out."""
+    """Refuse a new source for a task that --only excludes."""
     for name in new:
         if options.only is not None and name not in options.only:
             raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
 
 
 def _with_repair(error: BagError, bag: Path) -> BagError:
-    """Point to the repair where a recording was not finished."""
+    """Return the error; for an unfinished recording, with a hint to repair it."""
     unfinished = error.code == _TRUNCATED or (error.code == _NO_RECORDING and any(bag.glob("*.mcap")))
     if not unfinished:
         return error

@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _references(texts: list[str]) -> dict[str, str]:
-    """Return the commons that ``--speed-ref`` names, by drive; "" for the only one."""
+    """Return the commons that ``--speed-ref`` names, by drive; "" is the only drive."""
     found: dict[str, str] = {}
     for text in texts:
         drive, _, name = text.rpartition("=")
@@ -92,7 +92,7 @@ def _references(texts: list[str]) -> dict[str, str]:
 
 
 def _places(arguments: argparse.Namespace) -> tuple[Path | None, Path | None]:
-    """Return where page and picture go, None for what is not wanted."""
+    """Return the files of page and picture, None for one that is not requested."""
     output: Path | None = arguments.output
     png: Path | None = arguments.png
     if output is None and png is None:
@@ -105,7 +105,7 @@ def _places(arguments: argparse.Namespace) -> tuple[Path | None, Path | None]:
 
 
 def _pictures(report: DriveReport, together: bytes | None) -> dict[str, bytes]:
-    """Return the picture of each drive that has a course, as a PNG file; that of one alone is drawn already."""
+    """Return the picture of each drive with recorded signals, as a PNG file; a single drive's is ``together``."""
     found: dict[str, bytes] = {}
     if len(report.drives) == 1:
         return {} if together is None else {report.drives[0][0].drive.name: together}
@@ -117,7 +117,7 @@ def _pictures(report: DriveReport, together: bytes | None) -> dict[str, bytes]:
 
 
 def _together(report: DriveReport) -> Traces:
-    """Return the lines of all drives for one picture: each has lanes of its own."""
+    """Return the lines of all drives for one picture, in separate lanes for each drive."""
     all_traces = [report.traces(run, marks) for run, marks in report.drives]
     if len(all_traces) == 1:
         return all_traces[0]

@@ -1,4 +1,4 @@
-"""The pages of ``automax report``: that of drives, and that of a rack without one."""
+"""The pages of ``automax report``: for drives, and for a rack without a drive."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from automax_ros.replay.drive_report.happenings import Event
 from automax_ros.replay.drive_report.rack_report import RackReport
 
 MOST_ROWS = 500
-"""Longest table of the page (decision); it says how many rows there are more."""
+"""Most rows of a table of the page (decision); the number of further rows is printed below it."""
 _STYLE = """
 body { font-family: sans-serif; margin: 2em auto; max-width: 75em; color: #222; }
 img { max-width: 100%; }
@@ -28,11 +28,11 @@ tr.error td { color: #a01020; }
 .note { color: #555; }
 """
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-"""Nothing is loaded, no script runs, whatever a recording has put into a name."""
+"""Nothing is loaded and no script runs, whatever a recording has in its names."""
 
 
 def document(title: str, subtitle: str, parts: Sequence[str]) -> str:
-    """Return a page: its title, a line beneath, and parts that are HTML already."""
+    """Return a page of a title, a line below it, and parts that are HTML already."""
     head = [
         "<!DOCTYPE html>",
         '<html lang="en"><head><meta charset="utf-8">',
@@ -45,13 +45,13 @@ def document(title: str, subtitle: str, parts: Sequence[str]) -> str:
 
 
 def image(name: str, picture: bytes) -> str:
-    """Return a PNG file as a part of the page."""
+    """Return a PNG picture as an HTML element."""
     encoded = base64.b64encode(picture).decode("ascii")
     return f'<img alt="{plain(name)} over time" src="data:image/png;base64,{encoded}">'
 
 
 def sequence(events: Sequence[Event], untold: int) -> list[str]:
-    """Return what happened as a table, nothing where nothing did."""
+    """Return the events as a table, empty without events; ``untold`` is the number of events not listed."""
     if not events:
         return []
     found = [(f"{item.time_s:.4f}", item.kind, item.text) for item in events]
@@ -68,7 +68,7 @@ def rows(
     classes: Sequence[str] = (),
     untold: int = 0,
 ) -> list[str]:
-    """Return a table; ``numbers`` are the columns with numbers, ``classes`` the kinds of its rows."""
+    """Return a table; ``numbers`` are the columns with numbers, ``classes`` the CSS classes of its rows."""
     right = set(numbers)
     lines = ["<table>"]
     if any(head):
@@ -88,7 +88,7 @@ def rows(
 
 
 def plain(text: str) -> str:
-    """Return a text as HTML that shows it, whatever is in it."""
+    """Return a text escaped for HTML."""
     return escape(printable(text), quote=True)
 
 
@@ -101,7 +101,7 @@ _ENERGIES = {
 
 
 def page(report: DriveReport, recording: str, pictures: Mapping[str, bytes]) -> str:
-    """Return the page; ``pictures`` are PNG files by the name of their drive, ``recording`` is what is read."""
+    """Return the page of drives; ``pictures`` are PNG files by drive, ``recording`` is the recording's name."""
     title = f"{report.rack}: {_words(run.drive.name for run, _ in report.drives)}"
     parts: list[str] = []
     for run, marks in report.drives:
@@ -146,7 +146,7 @@ def _drive(run: DriveRun, errors: int, picture: bytes | None) -> list[str]:
 
 
 def totals(run: DriveRun, errors: int) -> list[tuple[str, str]]:
-    """Return what the run of a drive adds up to, in words."""
+    """Return the totals of a drive's run, in words."""
     found: list[tuple[str, str]] = []
     if run.drive.parameters is not None:
         found.append(("motor", _motor(run.drive.parameters)))

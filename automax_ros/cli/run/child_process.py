@@ -1,8 +1,8 @@
-"""A process that another one watches: what it prints comes line by line, and it ends when its watcher does.
+"""A child process whose output is read line by line and which ends when its parent does.
 
-Its standard input is a pipe that nobody writes: it ends when the watcher is gone, however that went, and the child
-ends then, too. A child stands in a session of its own, so that Ctrl-C reaches the watcher alone, which ends its
-children in order.
+Its standard input is a pipe to which nothing is written: it is closed when the parent is gone, for whatever cause, and
+the child ends then, too. A child has its own session, so that Ctrl-C reaches the parent alone, which ends its
+children cleanly.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from typing import IO
 from automax_ros.cli.output.signals import StopRequest
 
 _MOST_BYTES = 64_000_000
-"""Longest line that is kept, bytes (decision): a report with all commons is far below."""
+"""Longest line that is kept, bytes (decision): a report with all commons is much shorter."""
 _READ_BYTES = 1 << 16
 
 
 class Lines:
-    """One stream of a child."""
+    """Reads one output stream of a child line by line."""
 
     def __init__(self, stream: IO[bytes], hear: Callable[[str], None]) -> None:
-        """Take a pipe; ``hear`` gets each line of it."""
+        """Read from a pipe; ``hear`` is called with each line."""
         self._stream, self._hear = stream, hear
         self._rest = b""
         os.set_blocking(stream.fileno(), False)
 
     def fileno(self) -> int:
-        """Return the file to wait for."""
+        """Return the file descriptor to wait for."""
         return self._stream.fileno()
 
     def read(self) -> bool:
-        """Hear what is there now; return FALSE at the stream's end."""
+        """Read what is available now; return FALSE at the stream's end."""
         try:
             data = os.read(self.fileno(), _READ_BYTES)
         except BlockingIOError:
@@ -48,15 +48,15 @@ class Lines:
         return bool(data)
 
     def close(self) -> None:
-        """Hear no more."""
+        """Close the pipe."""
         self._stream.close()
 
 
 class Child:
-    """A process that has been started. ``out`` and ``err`` are its streams."""
+    """A process that has been started. ``out`` and ``err`` are its output streams."""
 
     def __init__(self, command: Sequence[str], hear: Callable[[str], None], complain: Callable[[str], None]) -> None:
-        """Start it; its lines on standard output go to ``hear``, those on standard error to ``complain``."""
+        """Start the process; ``hear`` is called with each line of standard output, ``complain`` of standard error."""
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True)
         assert self._process.stdout is not None
@@ -70,15 +70,15 @@ class Child:
 
     @property
     def code(self) -> int | None:
-        """The exit code, less than 0 where a signal has ended it, None while it lives."""
+        """The exit code, less than 0 where a signal has ended it, None while it runs."""
         return self._process.poll()
 
     def send(self, number: signal.Signals) -> None:
-        """Send a signal; one that has ended already gets none."""
+        """Send a signal, unless the process has ended."""
         self._process.send_signal(number)
 
     def close(self) -> None:
-        """Let go of a child that has ended, or that is killed by this."""
+        """Kill the child if it still runs, and close its streams."""
         if self.code is None:
             self._process.kill()
             self._process.wait()
@@ -88,7 +88,7 @@ class Child:
 
 
 def end_with_watcher(stop: StopRequest) -> None:
-    """Let the watcher's end ask this process to end, too: in a child, before it does anything."""
+    """Request a stop when the parent ends; to be called in a child before it does anything else."""
 
     def watch() -> None:
         try:

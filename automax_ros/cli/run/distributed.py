@@ -1,4 +1,4 @@
-"""A run on the wall clock whose modules are processes: one is started for each seat of the rack, and watched."""
+"""A run of a distributed rack on the wall clock: starts and supervises one process for each seat of the rack."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from automax_ros.ros.setup.lock import InstanceLock, domain_id
 
 _Part = TypeVar("_Part")
 _SEATS, _HOME, _RECORDER = range(3)
-"""The order in which processes end: tasks first, then common memory, then what records both."""
+"""The order in which processes end: tasks first, then common memory, then the recorder."""
 _RECORDER_NAME = "recorder"
 _RECORDER_WAIT_S = "60"
-"""How long the recorder waits for a rack whose processes take their time to start, s (decision)."""
+"""How long the recorder waits for the rack, whose processes take a while to start, s (decision)."""
 _WHOLE = "distributed"
-"""The seat in the lock of who has started all the others."""
+"""The seat under which the supervising process holds the lock."""
 
 
 def run_distributed(plan: RunPlan, arguments: argparse.Namespace, stop: StopRequest) -> int:
-    """Run until all processes have ended, by themselves or asked to; return the exit code.
+    """Run until all processes have ended, by themselves or on request; return the exit code.
 
     ``arguments`` are those of ``automax run``, from which the plan was made.
     """
@@ -53,7 +53,7 @@ def run_distributed(plan: RunPlan, arguments: argparse.Namespace, stop: StopRequ
 
 
 def _posts(plan: RunPlan, seats: Sequence[RackProcess], arguments: argparse.Namespace) -> Iterator[ProcessSpec]:
-    # What happens to lie in the working folder is not to be imported.
+    # Modules that happen to be in the working folder must not be imported.
     safe = ["-P"] if sys.version_info >= (3, 11) else []
     automax = [sys.executable, *safe, "-m", "automax_ros.cli.main"]
     common = [str(plan.config.path), "--watched", "--run-id", str(int.from_bytes(os.urandom(8), "big") >> 1 or 1)]
@@ -78,7 +78,7 @@ def _posts(plan: RunPlan, seats: Sequence[RackProcess], arguments: argparse.Name
 
 
 def _recording(arguments: argparse.Namespace) -> list[str]:
-    """Return the options of ``automax record`` that say what ``--record-...`` says."""
+    """Return the options of ``automax record`` that correspond to ``--record-...``."""
     if arguments.record_locals:
         raise UsageError("--record-locals is not possible with --distributed: the recorder is a process of its own")
     split_ns = arguments.record_split_s
@@ -101,7 +101,7 @@ def _given(option: str, values: Sequence[str] | None) -> list[str]:
 
 
 def _seconds(time_ns: int) -> str:
-    """Return a time in seconds, exactly."""
+    """Return a time in seconds with all nine decimals."""
     return f"{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d}"
 
 
@@ -115,7 +115,7 @@ def _opening(plan: RunPlan, seats: Sequence[RackProcess], domain: int) -> str:
 
 
 class _Watch:
-    """What the person sees of the processes, and what they came to."""
+    """Shows the output of the processes and merges their progress, summaries and reports."""
 
     def __init__(self, plan: RunPlan, seats: Sequence[RackProcess]) -> None:
         self._plan, self._names = plan, [seat.name for seat in seats]
@@ -127,7 +127,7 @@ class _Watch:
         self._reports: dict[str, Any] = {}
 
     def heard(self, name: str, told: ProcessMessage) -> None:
-        """Show what a process says; parts are shown together."""
+        """Show a message of a process; progress is shown merged, summaries and reports are kept for the end."""
         if isinstance(told, TextLine):
             self.message(f"{name}: {told.text}")
         elif isinstance(told, Progress):
@@ -137,7 +137,7 @@ class _Watch:
                 self._screen.progress(merged_progress(_in_order(self._names, self._progress)))
         elif isinstance(told, Summary):
             self._summaries[name] = told
-        elif told.report:  # one that has not begun has nothing to report
+        elif told.report:  # the report of a process that has not begun is empty
             self._reports[name] = told.report
 
     def complained(self, name: str, line: str) -> None:
@@ -145,7 +145,7 @@ class _Watch:
         print(f"{name}: {line}", file=sys.stderr, flush=True)
 
     def died(self, name: str, how: str, again_s: float | None) -> None:
-        """Tell that a process has died."""
+        """Show that a process has died."""
         self._progress.pop(name, None)
         again = f"it is started again in {again_s:.1f} s" if again_s is not None else "it is not started again"
         self.message(f"{name} {how}: {again}")

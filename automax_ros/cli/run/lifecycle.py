@@ -31,17 +31,17 @@ from automax_ros.runtime.health import Health
 _LOOK_S = 0.05
 """Longest wait while no rack runs."""
 _MOST_TOLD = 100
-"""Most findings of a file that go to the log."""
+"""Most findings of a file that are logged."""
 _FAULTS = (RackError, StimuliRefused, BagError, UserError)
-"""What a rack can have against being configured: things for the person to mend."""
+"""Errors that keep a rack from being configured and that the user can correct."""
 _PARTS_END = "the rack runs in several processes: they are started and ended by `automax run --distributed`"
 
 
 @dataclass(frozen=True)
 class LifecycleRun:
-    """What is managed: a rack's name in the graph, and how its plan is read.
+    """A managed rack: its namespace in the graph, and how to read its plan.
 
-    ``plan`` is that of the first configuration where it was read already; ``read`` reads the files (again).
+    ``plan`` is the plan of the first configuration if it has been read already; ``read`` reads the files (again).
     """
 
     namespace: str
@@ -51,7 +51,7 @@ class LifecycleRun:
 
 
 class LifecycleRunner:
-    """Carries out the transitions of one rack's node, and lets the rack live in between."""
+    """Carries out the transitions of one rack's node, and runs the rack in between."""
 
     def __init__(self, managed: LifecycleRun, process: RosProcess, stop: StopRequest, domain: int) -> None:
         self._managed, self._process, self._stop, self._domain = managed, process, stop, domain
@@ -72,7 +72,7 @@ class LifecycleRunner:
         """Configure and activate.
 
         Raises:
-            RackError, StimuliRefused, BagError, Fault: what keeps the rack from it.
+            RackError, StimuliRefused, BagError, UserError: the rack cannot be configured or activated.
         """
         self._is_starting = True
         for transition in (CONFIGURE, ACTIVATE):
@@ -81,7 +81,7 @@ class LifecycleRunner:
         self._is_starting = False
 
     def run(self) -> None:
-        """Let the rack live, and carry transitions out, until a signal, the run's duration or a shutdown."""
+        """Run the rack and carry out transitions until a signal, the end of the duration or a shutdown."""
         while not (self._stop.requested or self._ended):
             if self._node.state == FINALIZED:  # everything has failed, even stopping
                 self._broken = True
@@ -97,7 +97,7 @@ class LifecycleRunner:
                 self._ended = True
 
     def close(self) -> None:
-        """End what runs, and leave the graph."""
+        """End the run and remove the node from the graph."""
         try:
             self._end_session()
         finally:
@@ -110,7 +110,7 @@ class LifecycleRunner:
     def refusal(self, transition: str) -> str | None:
         """Without an operator only a rack that was never active may be managed (decision: somebody must start it).
 
-        One that runs in several processes is configured and ended by starting and ending them (decision).
+        A distributed rack is configured and ended by starting and ending its processes (decision).
         """
         plan = None if self._session is None else self._session.plan
         if plan is None:
@@ -120,7 +120,7 @@ class LifecycleRunner:
         return NOT_OPERATED if self._was_active and not plan.config.operator else None
 
     def configure(self) -> None:
-        """Read the files and compile: the nodes of the modules appear."""
+        """Read the files, compile the tasks and create the nodes of the modules."""
         try:
             self._configure()
         except WorkInterrupted as cut:
@@ -143,7 +143,7 @@ class LifecycleRunner:
         self._operate(self._expected().live.nodes.deactivate)
 
     def cleanup(self) -> None:
-        """Let the nodes of the modules leave the graph; what is not volatile is kept, the recording is finished."""
+        """Remove the nodes of the modules from the graph; save non-volatile values and finish the recording."""
         self._end_session()
 
     def shutdown(self) -> None:
@@ -151,7 +151,7 @@ class LifecycleRunner:
         self._ended = True
 
     def fail(self) -> None:
-        """STOP ALL, and let the nodes of the modules leave the graph."""
+        """STOP ALL, and remove the nodes of the modules from the graph."""
         session = self._session
         if session is not None and session.rack.operations.powered:
             session.rack.operations.stop_all("a transition of the node rack failed")
@@ -182,7 +182,7 @@ class LifecycleRunner:
         return self._stop.requested or self._ended or bool(self._asked)
 
     def _started(self, error: Exception | None) -> None:
-        """Raise what keeps the rack from its autostart, but for a signal."""
+        """Raise the error that prevented the autostart, unless a signal caused it."""
         if error is not None and not self._stop.requested:
             raise error.__cause__ or error
 
@@ -197,7 +197,7 @@ class LifecycleRunner:
             raise TransitionRefused(str(refused)) from refused
 
     def _tell(self, fault: Exception) -> None:
-        """Log what keeps the rack from being configured; at an autostart the command prints it as it ends."""
+        """Log why the rack cannot be configured; at an autostart the command prints it as it ends."""
         if not self._is_starting:
             _print_fault(fault)
         found = [(item, where) for where, items in getattr(fault, "findings", ()) for item in items]
@@ -206,7 +206,7 @@ class LifecycleRunner:
 
 
 def _print_fault(fault: Exception) -> None:
-    """Print what keeps a rack from being configured on standard error."""
+    """Print on standard error why a rack cannot be configured."""
     for source, diagnostics in getattr(fault, "findings", ()):
         print_diagnostics(diagnostics, source, sys.stderr)
     if str(fault):
@@ -214,7 +214,7 @@ def _print_fault(fault: Exception) -> None:
 
 
 def _numbered(folder: Path | None, number: int) -> Path | None:
-    """Return where the nth run of a program is recorded: each has a folder, DIR, DIR_2, DIR_3 (decision)."""
+    """Return the folder in which the nth run of a program is recorded: DIR, DIR_2, DIR_3 (decision)."""
     if folder is None or number == 1:
         return folder
     return folder.with_name(f"{folder.name}_{number}")
@@ -223,7 +223,7 @@ def _numbered(folder: Path | None, number: int) -> Path | None:
 def run_live(plan: RunPlan, stop: StopRequest) -> int:
     """Run a plan, whose files are read once, until its duration has passed or a stop is requested.
 
-    Returns the exit code. Raises what keeps the rack from running: see ``LiveSession``.
+    Returns the exit code. Raises the errors of ``LiveSession``.
     """
     if plan.seat is None or plan.seat.seat.holds_common_memory:
         return run_managed(LifecycleRun(plan.config.namespace, lambda: plan, plan, plan.ros), stop)
@@ -233,9 +233,9 @@ def run_live(plan: RunPlan, stop: StopRequest) -> int:
 
 
 def run_managed(managed: LifecycleRun, stop: StopRequest) -> int:
-    """Run a rack as a managed node: at once where its plan is there, else when a lifecycle manager asks for it.
+    """Run a rack as a managed node: at once if it has a plan, else when a lifecycle manager configures it.
 
-    Returns the exit code. Raises what keeps the rack from starting at once.
+    Returns the exit code. Raises the errors of ``LiveSession`` where the rack starts at once.
     """
     domain, plan = domain_id(), managed.plan
     seat = None if plan is None or plan.seat is None else plan.seat.seat.name
@@ -260,7 +260,7 @@ def _run_managed(run: LifecycleRunner, waiting: str | None) -> int:
 
 
 def _run_part(plan: RunPlan, stop: StopRequest, domain: int) -> int:
-    """Run a process of a distributed rack that has no common memory, and so not the node ``rack``."""
+    """Run a process of a distributed rack that has no common memory, and therefore no node ``rack``."""
     process = RosProcess(plan.ros)
     try:
         session = LiveSession(plan, process, None, stop, domain)
@@ -278,7 +278,7 @@ def _run_part(plan: RunPlan, stop: StopRequest, domain: int) -> int:
 
 
 def _waiting(managed: LifecycleRun, domain: int) -> str | None:
-    """Return what is printed where a manager is waited for."""
+    """Return the text to print while the rack waits for a lifecycle manager, None where it does not wait."""
     if managed.plan is not None:
         return None
     space = f"/{managed.namespace}"

@@ -28,15 +28,15 @@ from automax_ros.ros.setup.process import RosProcess
 from automax_ros.scenario.operation_log import OperationLog
 
 SWITCH_S = 0.0005
-"""How long a thread that saves or sends may keep the interpreter from the scans, s (5 ms is Python's own)."""
+"""Interpreter switch interval, s: how long a thread that saves or sends may delay scans (Python's default is 5 ms)."""
 
 PATIENCE_NS = 5 * NS_PER_S
-"""After this time a process says for which others it waits (decision)."""
+"""Time after which a process names the processes that it waits for (decision)."""
 _NEVER_NS = 1 << 63
 
 
 class LiveSession:
-    """One rack with its nodes: ``start`` it, ``run`` it any number of times, ``close`` it in any case.
+    """One rack with its nodes: ``start`` it, ``run`` it any number of times, always ``close`` it.
 
     Attributes:
         live: the rack in its nodes.
@@ -46,13 +46,13 @@ class LiveSession:
     def __init__(
         self, plan: RunPlan, process: RosProcess, manager: RackNode | None, stop: StopRequest, domain: int
     ) -> None:
-        """Compile the rack's tasks and create its nodes, its recording and what else the plan asks for.
+        """Compile the rack's tasks and create its nodes, its recording and whatever else the plan asks for.
 
         Raises:
             RackError: a task has errors.
             StimuliRefused: the stimuli have errors, which were printed.
             BagError, RetentionFault: the recording or the state's folder cannot be used.
-            CutShort: a signal came while tasks were compiled.
+            WorkInterrupted: a signal came while tasks were compiled.
         """
         self.plan, self._domain = plan, domain
         self.has_begun = False
@@ -90,11 +90,11 @@ class LiveSession:
         """Put the rack into RUN for the first time; FALSE where a stop is requested first.
 
         Raises:
-            SeatTaken: another process of a distributed run has the same modules.
+            ProcessAlreadyRuns: another process of a distributed run has the same modules.
         """
         self._ending.callback(sys.setswitchinterval, sys.getswitchinterval())
         sys.setswitchinterval(SWITCH_S)
-        # What is there now stays: a look of the collector at all of it would hold up scans by tens of ms.
+        # What exists now stays: if the garbage collector went through all of it, scans would be late by tens of ms.
         gc.collect()
         gc.freeze()
         self._ending.callback(gc.unfreeze)
@@ -111,7 +111,7 @@ class LiveSession:
         return True
 
     def run(self, should_stop: Callable[[], bool]) -> None:
-        """Let the rack live until its duration has passed or something else is to be done."""
+        """Run the rack until its duration has passed or ``should_stop``."""
 
         def on_idle(now_ns: int) -> None:
             self.live.stopping = should_stop()
@@ -146,7 +146,7 @@ class LiveSession:
         if self.plan.record is None:
             return None
         recorder = Recorder(self.rack, self.live.stream, self.plan.record, self.plan.recording)
-        # Closed after the rack, whose last messages it takes.
+        # Closed after the rack, whose last messages it records.
         rack = self._ending.pop_all()
         self._ending.callback(recorder.sync_at_end)
         self._ending.callback(recorder.close)
@@ -207,7 +207,7 @@ def _opening(plan: RunPlan, rack: Rack, domain: int) -> str:
 
 
 def _time(plan: RunPlan) -> str:
-    """Return whose time the rack has, on a line of its own, where that is not the wall clock's."""
+    """Return which clock the rack follows, on a separate line; empty for the wall clock."""
     if plan.simulated is not None:
         rate = plan.simulated.rate
         pace = "as fast as it goes" if rate is None else f"{rate:g} times the wall clock"

@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_native_arguments(parser)
     add_outside_argument(parser)
     add_ros_arguments(parser)
-    # For `automax run --distributed`: lines as cli/run/process_messages.py has them, and an end with standard input's.
+    # For `automax run --distributed`: prints the lines of cli/run/process_messages.py, ends when standard input does.
     parser.add_argument("--watched", action="store_true", help=argparse.SUPPRESS)
 
 
@@ -143,7 +143,7 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[RackPro
 
 
 def _print_seats(seats: tuple[RackProcess, ...]) -> None:
-    """Print the processes of a rack, each with why its modules share it."""
+    """Print the processes of a rack, each with its modules and why they share it."""
     for seat in seats:
         print(f"{seat.name:18}{' '.join(seat.modules)}")
         for reason in seat.reasons:

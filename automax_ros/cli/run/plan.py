@@ -1,4 +1,4 @@
-"""What a run was asked for, and what both kinds of run tell."""
+"""The plan of a run, and the output that live and simulated runs have in common."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ from automax_ros.scenario.stimuli.stage import OperationRecord
 
 @dataclass(frozen=True)
 class ProcessPlan:
-    """The part of a run of a distributed rack that is in this process.
+    """The part of a distributed rack that runs in this process.
 
-    ``seats`` are all processes of the rack. ``run_id`` is the number of the run, 0 to take that of the processes that
-    are there, or a new one. ``watched``: another process has started this one. ``start_delay_ns`` is how long after all
-    are there the rack starts, None for the usual. ``awaits_recorder``: not before a recorder hears this process.
+    ``seats`` are all processes of the rack. ``run_id`` is the number of the run, 0 for that of the processes that
+    already run, or a new one. ``watched``: another process has started this one. ``start_delay_ns`` is how long after
+    all processes are present the rack starts, None for the default. ``awaits_recorder``: the rack does not start before
+    a recorder receives this process's messages.
     """
 
     seat: RackProcess
@@ -48,15 +49,15 @@ class ProcessPlan:
 
 @dataclass(frozen=True)
 class RunPlan:
-    """A run.
+    """The plan of a run.
 
-    ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the one that was
-    named for values that outlive the run, if any. ``watch`` is what ``--watch`` names, None without it.
-    ``stimuli`` is the file of what happens to the rack, ``report`` that
-    in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders. ``ros`` is what the
-    command line says to ROS. ``seat`` is the part of the rack that is run, None for all of it.
-    ``simulated`` is simulated time where the rack has ROS nodes all the same. ``tunings`` is what ``--set`` tunes.
-    ``native`` says which tasks scan as machine code, ``verbose`` that a person wants to know what became of them.
+    ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the folder given
+    for values that outlive the run, if any. ``watch`` are the variables of ``--watch``, None without it. ``stimuli`` is
+    the stimuli file, ``report`` the file for the report of the run's end; ``allow_outside`` allows stimuli to name
+    sources in other folders. ``ros`` are the ROS arguments of the command line. ``seat`` is the part of the rack that
+    is run, None for all of it. ``simulated`` is the simulated time of a rack with ROS nodes, None for the wall clock
+    and for a rack without nodes. ``tunings`` are the tunables set with ``--set``. ``native`` says which tasks scan as
+    machine code, ``verbose`` prints which of them do.
     """
 
     config: RackConfig
@@ -78,7 +79,7 @@ class RunPlan:
 
     @property
     def is_watched(self) -> bool:
-        """Whether another process has started this one, and tells the person what it says."""
+        """Whether another process has started this one and shows its output."""
         return self.seat is not None and self.seat.watched
 
     @property
@@ -88,14 +89,14 @@ class RunPlan:
 
     @property
     def state_folder(self) -> Path | None:
-        """Where a run keeps what outlives it, in simulated time only where that is said; processes have one each."""
+        """The folder of the kept state, in simulated time only where one is given; each process has its own."""
         if self.state is not None or self.simulated is not None:
             return self.state
         whole = default_folder(self.config)
         return whole if self.seat is None else whole / self.seat.seat.name
 
     def shown(self, rack: Rack) -> Sequence[CommonElement]:
-        """Return the commons that the status line of a rack, or of this process's part of it, shows."""
+        """Return the commons that the status line shows for a rack, or for this process's part of it."""
         if self.watch is not None:
             return self.watch
         if self.seat is not None and not self.seat.seat.holds_common_memory:
@@ -112,26 +113,26 @@ class RunPlan:
 
 
 def warn(rack: Rack) -> None:
-    """Say how many warnings the tasks' checks gave."""
+    """Print how many warnings the checks of the tasks gave."""
     tell_warnings(rack.warnings, "its tasks", rack.config.path)
 
 
 def tell_forms(rack: Rack, plan: RunPlan) -> None:
-    """Say which tasks are native, and why others are not, if that is wanted."""
+    """Print which tasks are native, and why others are not, if the plan asks for it."""
     if plan.verbose:
         tell_native(rack.operations.installation.native.values())
 
 
 def report_at_end(rack: Rack, stimulation: StimuliPlayer, others: Sequence[OperationRecord] = ()) -> dict[str, Any]:
-    """Return the report of a rack as it is before anything is closed; ``others`` have operated it besides stimuli."""
+    """Return the report of a rack before anything is closed; ``others`` are the operations not caused by stimuli."""
     return report_of(rack, sorted((*stimulation.happened, *others), key=lambda item: item.at_ns))
 
 
 def conclude(rack: Rack, plan: RunPlan, report: dict[str, Any] | None, *, failed: bool) -> int:
     """Write the report, print what stopped the rack, and return the exit code.
 
-    The code is 1 after a fault, or where something has ``failed``, such as an operation of the stimuli; a STOP ALL that
-    was commanded is as good an end as any.
+    The code is 1 after a fault, or where something has ``failed``, such as an operation of the stimuli. A commanded
+    STOP ALL is a clean end.
     """
     if plan.report is not None and report is not None:
         write_report(plan.report, report)

@@ -1,4 +1,4 @@
-"""The report of a distributed rack: each process tells its part, and they are put together as if it had been one."""
+"""Messages from the processes of a distributed rack to their supervisor, one JSON line each, and the merged report."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PERIOD_NS = NS_PER_S // 5
 
 @dataclass(frozen=True)
 class TextLine:
-    """A line for the person."""
+    """A line of text for the user."""
 
     text: str
 
@@ -32,14 +32,14 @@ class Reported:
 
 
 ProcessMessage = TextLine | Progress | Summary | Reported
-"""What a line says."""
+"""A message, parsed from a line."""
 
 
 class ProcessOutput:
-    """The screen of a process that another one watches (``cli/run/status.Screen``)."""
+    """The output of a process that another one has started (``cli/run/status.RunOutput``)."""
 
     def __init__(self) -> None:
-        """Begin; nothing is told yet."""
+        """Create the output; nothing is sent yet."""
         self.began_ns = self._last_ns = time.monotonic_ns()
 
     def due(self) -> int:
@@ -52,25 +52,25 @@ class ProcessOutput:
         return passed
 
     def progress(self, progress: Progress) -> None:
-        """Tell how the process stands."""
+        """Send the progress of the process."""
         _tell("progress", dataclasses.asdict(progress))
 
     def message(self, text: str) -> None:
-        """Tell a line."""
+        """Send a line of text."""
         _tell("say", text)
 
     def summary(self, summary: Summary) -> None:
-        """Tell what the process's part came to."""
+        """Send the summary of the process's part."""
         _tell("summary", dataclasses.asdict(summary))
 
 
 def tell_report(report: Mapping[str, Any]) -> None:
-    """Tell this process's part of the report: it ends in order."""
+    """Send this process's part of the report, by which it announces a clean end."""
     _tell("report", report)
 
 
 def heard(line: str) -> ProcessMessage:
-    """Return what a line of a process says."""
+    """Return the message in a line of a process; a line that is not a message is text."""
     try:
         data = json.loads(line)
         if isinstance(data, dict) and len(data) == 1:
@@ -103,9 +103,9 @@ def merged_report(
 ) -> dict[str, Any]:
     """Return the report of a rack, from those of its processes by name.
 
-    ``names`` are those of all processes, that of common memory first. Commons, forces and time are the first's; tasks
-    and displays are of their own processes; what was done in several processes at one instant was done once, and is
-    refused where one of them has refused it. ``processes`` says of each how often it died, whether it has told its
+    ``names`` are those of all processes, that of common memory first. Commons, forces and time are taken from the
+    first, tasks and displays from their own processes. Operations in several processes at one instant count as one,
+    which is refused if one of them refused it. ``processes`` gives for each how often it died, whether it has sent its
     part, and which commons had another value there at its end: those that were written in the last moment (decision).
     """
     there = [parts[name] for name in names if name in parts]

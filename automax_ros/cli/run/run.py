@@ -118,8 +118,8 @@ def folder(text: str) -> Path:
 def run(arguments: argparse.Namespace) -> int:
     """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault.
 
-    A simulated run without ROS that a signal ends before it begins has the signal's code: whoever goes by it would take
-    the report of an earlier run for this one's.
+    A simulated run without ROS that a signal ends before it begins returns the signal's code: after 0 a script would
+    read the report of an earlier run as this one's.
     """
     if arguments.simulated and arguments.record is not None and arguments.duration is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
@@ -187,7 +187,7 @@ def _read(arguments: argparse.Namespace, stop: StopRequest) -> RunPlan:
 def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
     simulated = SimulatedTime(_rate(arguments.rate)) if arguments.with_ros else None
     ros = NO_ARGUMENTS if arguments.simulated and not arguments.with_ros else ros_arguments(arguments)
-    if simulated is not None:  # whoever sends /clock does not follow it
+    if simulated is not None:  # a rack that publishes /clock does not follow it
         ros = ros.without("use_sim_time")
     config = replace(config, namespace=ros.placed(config.namespace))
     settings, tunings = split_settings(config, arguments.settings)
@@ -214,7 +214,7 @@ def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
 
 
 def _check_time(arguments: argparse.Namespace) -> None:
-    """Refuse options that would have no effect on a run in simulated time, or on one that is not."""
+    """Refuse options that would have no effect on this run, in simulated time or on the wall clock."""
     if arguments.with_ros and not arguments.simulated:
         raise UsageError("--ros belongs to --simulated", "on the wall clock the rack has ROS nodes anyway")
     if arguments.rate is not None and not arguments.with_ros:
@@ -224,7 +224,7 @@ def _check_time(arguments: argparse.Namespace) -> None:
 
 
 def _check_clock(plan: RunPlan) -> None:
-    """Refuse ``use_sim_time`` for a rack in several processes, before they are started."""
+    """Refuse ``use_sim_time`` for a distributed rack, before its processes are started."""
     from automax_ros.ros.base.node import follows_clock
 
     if follows_clock(plan.ros, plan.config.namespace):
@@ -241,7 +241,7 @@ def _rate(text: str | None) -> float | None:
 
 
 def check_files(arguments: argparse.Namespace) -> None:
-    """Refuse a report that cannot be written, or that would be written over what is read, and a state's folder."""
+    """Refuse a report that cannot be written or would overwrite an input, and a state folder that cannot be used."""
     if arguments.state is not None:
         require_folder("--state", arguments.state)
     if arguments.report is not None:
@@ -252,7 +252,7 @@ def check_files(arguments: argparse.Namespace) -> None:
 
 
 def watched_commons(config: RackConfig, texts: list[str] | None) -> tuple[CommonElement, ...] | None:
-    """Return what ``--watch`` names, None without it.
+    """Return the variables that ``--watch`` names, None without it.
 
     Raises:
         UsageError: the rack has no such variable.

@@ -1,4 +1,4 @@
-"""What `automax run` does about values that outlive a run: they come back at the start and are saved as it goes."""
+"""Saves what outlives a run: kept state is restored at the start and saved as the run goes; recordings are synced."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from automax_ros.rack.rack import Rack
 from automax_ros.recordings.write.recorder import Recorder
 
 SYNC_PERIOD_S = 0.4
-"""Pause between two waits for the disk itself, so that a power failure costs about a second too."""
+"""Pause between two syncs to the disk, so that a power failure, too, loses only about a second."""
 
 
 class RecordingMonitor:
-    """Tells the person when a recording ends before its rack; without a recorder it does nothing."""
+    """Reports a recording that ends before its rack; without a recorder it does nothing."""
 
     def __init__(self, recorder: Recorder | None, display: StatusDisplay) -> None:
         self._recorder = recorder
@@ -29,16 +29,16 @@ class RecordingMonitor:
 
     @property
     def failed(self) -> bool:
-        """Whether the recording broke off."""
+        """Whether the recording failed before the end."""
         return self._recorder is not None and self._recorder.failure is not None
 
     def flush(self, now_ns: int) -> None:
-        """Let what an idle rack has recorded reach the file."""
+        """Write the pending messages of an idle rack to the file."""
         if self._recorder is not None:
             self._recorder.flush(now_ns)
 
     def tell(self) -> None:
-        """Say on standard error, once, that the recording has broken off."""
+        """Report once, on the display and on standard error, that the recording has failed."""
         if self.failed and not self._told:
             assert self._recorder is not None
             self._told = True
@@ -47,7 +47,7 @@ class RecordingMonitor:
 
 
 class DiskSync:
-    """Calls a function that waits for the disk, again and again, on a thread of its own: no scan waits with it."""
+    """Calls a function that waits for the disk, periodically and in its own thread, so that no scan waits for it."""
 
     def __init__(self, sync: Callable[[], None]) -> None:
         self._sync = sync
@@ -66,14 +66,14 @@ class DiskSync:
 
 
 SAVE_PERIOD_NS = 5 * NS_PER_S
-"""How often a changed state is saved while the rack runs, so that a killed run loses little (decision)."""
+"""Period at which a changed state is saved while the rack runs, so that a killed run loses little (decision)."""
 
 
 class SavedState:
     """Keeps a rack's state in a folder, or nowhere if that is None."""
 
     def __init__(self, rack: Rack, folder: Path | None) -> None:
-        """Bring back what a folder holds, before anybody observes the rack: nodes and recordings begin with it.
+        """Restore the state of a folder, before the rack has observers: nodes and recordings begin with it.
 
         Raises:
             RetentionFault: the folder cannot be read or holds something else.
@@ -105,7 +105,7 @@ class SavedState:
         return news
 
     def update(self, now_ns: int) -> None:
-        """Save what has changed if it is time to, on a thread of its own: no scan waits for the disk."""
+        """Save a changed state if it is due, in a separate thread, so that no scan waits for the disk."""
         busy = self._saving is not None and self._saving.is_alive()
         if now_ns >= self._next_ns and self._retention is not None and not busy:
             self._next_ns = now_ns + SAVE_PERIOD_NS
@@ -114,12 +114,12 @@ class SavedState:
             self._saving.start()
 
     def freeze(self) -> None:
-        """Take down what the end will save: to be called while the tasks still run, so that AUTO RUN knows them."""
+        """Capture the state to be saved at the end; call it while the tasks still run, so that AUTO RUN knows them."""
         if self._retention is not None:
             self._last = self._retention.present()
 
     def end(self) -> None:
-        """Save what has changed, the state of ``freeze`` if it was called."""
+        """Save a changed state: that of ``freeze`` if it was called, else the present one."""
         if self._saving is not None:
             self._saving.join()
         if self._retention is not None:
@@ -135,7 +135,7 @@ class SavedState:
 
 
 def _news(restored: Restored, path: Path) -> list[str]:
-    """Return what to tell of a state that came back."""
+    """Return the messages about a restored state."""
     counts = [count_of(restored.commons, "common"), count_of(restored.tunables, "tunable")]
     counts += [count_of(restored.forces, "force")] if restored.forces else []
     told = any((restored.commons, restored.tunables, restored.forces))

@@ -15,7 +15,7 @@ from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 
 SLICE_NS = 100 * NS_PER_MS
-"""Rack time between two looks at signals and the display."""
+"""Rack time between two checks of signals and updates of the display."""
 _ENDLESS_NS = 1 << 62
 _NO_END = "simulated time without an end: Ctrl-C ends the run (or give --duration S)"
 
@@ -24,7 +24,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     """Run until the duration has passed, nothing can happen any more, or a stop is requested; return the exit code.
 
     Raises:
-        CutShort: a signal came while tasks were compiled.
+        WorkInterrupted: a signal came while tasks were compiled.
     """
     with stop.cut_short():
         rack = Rack(plan.config, native=plan.native)
@@ -67,7 +67,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
 def _goes_on(rack: Rack, plan: RunPlan, stimulation: StimuliPlayer) -> bool:
     """Whether something can still happen: with stimuli a run lasts its duration, or until the last of them.
 
-    So a rack that is stopped can be put into RUN again; without stimuli nobody would (decision).
+    So stimuli can put a stopped rack into RUN again; without stimuli nothing would (decision).
     """
     if rack.stop_reason is None or not stimulation.is_over:
         return True

@@ -1,4 +1,4 @@
-"""What a person sees of a running rack: a live line on a terminal, plain lines elsewhere, a summary at the end."""
+"""The display of a running rack: a live line on a terminal, plain lines elsewhere, a summary at the end."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from automax_ros.runtime.health import Health
 
 @dataclass(frozen=True)
 class Progress:
-    """How a run stands.
+    """The progress of a run.
 
     Attributes:
         now_ns: rack time.
-        standing: what stands in the way of the tasks, such as ``power off``.
-        scans_per_s: how many scans there were since the last time, per second of rack time.
-        loads: what Processors do, in words; without any, ``pace`` is how many times faster than real time it went.
-        pace: see ``loads``.
+        standing: what keeps the tasks from running, such as ``power off``.
+        scans_per_s: scans per second of rack time since the last progress.
+        loads: loads of the Processors, in words.
+        pace: how many times faster than real time the run is, None on the wall clock, where ``loads`` are shown.
         trouble: counts of what went wrong, by its kind in words.
-        values: the variables that the person wants to see.
+        values: the watched variables with their values.
     """
 
     now_ns: int
@@ -45,7 +45,7 @@ class Progress:
 
     @property
     def parts(self) -> list[str]:
-        """The parts of the line that shows it."""
+        """The parts of the status line."""
         pace = [] if self.pace is None else [f"{self.pace:.0f}x"]
         trouble = [count_of(number, kind) for kind, number in self.trouble.items() if number]
         head = [f"{self.now_ns / NS_PER_S:8.1f} s", *self.standing, f"{self.scans_per_s:.0f} scans/s"]
@@ -53,7 +53,7 @@ class Progress:
 
 
 def merged_progress(parts: Sequence[Progress]) -> Progress:
-    """Return how a rack stands of which each process has told its part, that of common memory first."""
+    """Return the progress of a distributed rack from that of its processes, that of common memory first."""
     trouble: Counter[str] = Counter()
     for part in parts:
         trouble.update(part.trouble)
@@ -69,14 +69,14 @@ def merged_progress(parts: Sequence[Progress]) -> Progress:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run came to.
+    """The summary of a run.
 
     Attributes:
         seconds: rack time that has passed.
         live: whether execution times were measured.
-        rows: of the table of tasks.
-        notes: lines after it.
-        values: the variables that the person wants to see.
+        rows: the rows of the table of tasks.
+        notes: the lines after the table.
+        values: the watched variables with their values.
         took_s: seconds that a run in simulated time took, None for one on the wall clock.
     """
 
@@ -99,13 +99,13 @@ class Summary:
 
 
 def merged_summary(parts: Sequence[Summary]) -> Summary:
-    """Return what a rack's run came to of which each process has told its part, that of common memory first."""
+    """Return the summary of a distributed rack from those of its processes, that of common memory first."""
     rows = tuple(row for part in parts for row in part.rows)
     return Summary(parts[0].seconds, True, rows, tuple(note for part in parts for note in part.notes), parts[0].values)
 
 
 def recorded_size(folder: Path) -> str:
-    """Return how much a recording's folder holds, in MB; its disk may have gone while the rack ran."""
+    """Return the size of a recording's folder in MB; its disk may have disappeared while the rack ran."""
     try:
         return f"{sum(item.stat().st_size for item in folder.iterdir()) / 1e6:.2f} MB"
     except OSError:
@@ -113,11 +113,11 @@ def recorded_size(folder: Path) -> str:
 
 
 class RunOutput(Protocol):
-    """Where a run is shown."""
+    """The output that shows a run."""
 
     @property
     def began_ns(self) -> int:
-        """When it was made, on the monotonic clock."""
+        """When the output was created, in ns of the monotonic clock."""
         ...
 
     def due(self) -> int:
@@ -125,41 +125,41 @@ class RunOutput(Protocol):
         ...
 
     def progress(self, progress: Progress) -> None:
-        """Show how the run stands."""
+        """Show the progress of the run."""
         ...
 
     def message(self, text: str) -> None:
-        """Show a line of its own."""
+        """Show a separate line."""
         ...
 
     def summary(self, summary: Summary) -> None:
-        """Show what the run came to."""
+        """Show the summary of the run."""
         ...
 
 
 class TerminalOutput:
-    """The screen of a person: standard output."""
+    """Shows a run on standard output."""
 
     def __init__(self) -> None:
-        """Begin; nothing is printed yet."""
+        """Create the output; nothing is printed yet."""
         self._line = StatusLine()
         self.began_ns = self._line.began_ns
         self.due, self.message = self._line.due, self._line.message
 
     def progress(self, progress: Progress) -> None:
-        """Show the line of status, on a terminal in place of the last."""
+        """Show the status line; on a terminal it replaces the last one."""
         self._line.show(progress.parts)
 
     def summary(self, summary: Summary) -> None:
-        """Print the summary in place of the line."""
+        """Print the summary in place of the status line."""
         self._line.clear()
         print("\n".join(summary.lines), flush=True)
 
 
 class StatusDisplay:
-    """Shows a rack's progress on a screen; ``live``: on the wall clock, so loads can be measured.
+    """Shows a rack's progress on an output; ``live``: on the wall clock, so that loads can be measured.
 
-    ``health`` is what a rack on the wall clock has trouble with; each thing is a line when it first happens.
+    ``health`` counts what goes wrong in a rack on the wall clock; each kind is shown on a line when it first happens.
     """
 
     def __init__(
@@ -171,7 +171,7 @@ class StatusDisplay:
         health: Health | None = None,
         screen: RunOutput | None = None,
     ) -> None:
-        """Begin; nothing is shown before the first update is due. ``screen`` is a person's unless it is given."""
+        """Create the display; nothing is shown before the first update is due. ``screen`` None is standard output."""
         self._rack, self._watch, self._live, self._health = rack, watch, live, health
         self._screen: RunOutput = TerminalOutput() if screen is None else screen
         self.message = self._screen.message
@@ -180,14 +180,14 @@ class StatusDisplay:
         self._last_busy: dict[int, int] = {}
 
     def update(self, now_ns: int) -> None:
-        """Show news, and the state at a rack time if it is time to."""
+        """Show news, and the progress at a rack time if it is due."""
         self._tell_news()
         passed = self._screen.due()
         if passed:
             self._screen.progress(self._progress(now_ns, passed))
 
     def printed(self) -> None:
-        """Show what PRINT statements have written since the last call."""
+        """Show the output of PRINT statements since the last call."""
         for task in self._rack.tasks:
             while task.printed:
                 self.message(f"{task.name}: {printable(task.printed.popleft())}")
@@ -205,7 +205,7 @@ class StatusDisplay:
             self.message(f"recorded {bag}: {recorded_size(bag)}{rest}")
 
     def _rows(self) -> Iterator[str]:
-        """Return the summary's line of each task."""
+        """Yield the summary's row of each task."""
         for task in self._rack.tasks:
             statistics = self._rack.statistics[task.name]
             period = f"{task.period_ns / 1e6:g}" if task.period_ns else "-"
@@ -215,7 +215,7 @@ class StatusDisplay:
             yield row + (f"{mean:>10.1f}{statistics.longest_ns / 1000:>12.1f}" if self._live else "")
 
     def _notes(self) -> Iterator[str]:
-        """Return what the summary says of interrupts and errors."""
+        """Yield the summary's lines about interrupts and errors."""
         for module in self._rack.modules if self._live else ():
             if isinstance(module, Timed) and module.timing.interrupts:
                 yield f"  {module.config.name}: {module.timing.describe()}"
@@ -228,7 +228,7 @@ class StatusDisplay:
             self.message(printable(text))
 
     def _progress(self, now_ns: int, passed_ns: int) -> Progress:
-        """Return how the rack stands, ``passed_ns`` of the wall clock after the last time."""
+        """Return the rack's progress, ``passed_ns`` of the wall clock after the last one."""
         scans = sum(item.scans for item in self._rack.statistics.values())
         rack_ns = now_ns - self._last_rack_ns
         rate = (scans - self._last_scans) * NS_PER_S / rack_ns if rack_ns else 0.0
@@ -238,14 +238,14 @@ class StatusDisplay:
         return Progress(now_ns, self._standing(), rate, tuple(loads), pace, self._trouble(), self._values())
 
     def _standing(self) -> tuple[str, ...]:
-        """Return what stands in the way of the tasks: no power, or what stopped them all."""
+        """Return what keeps the tasks from running: no power, or what stopped them all."""
         operations = self._rack.operations
         if not operations.powered:
             return ("power off",)
         return () if operations.stopped is None else (operations.stopped.title,)
 
     def _load(self, module: Module, passed_ns: int) -> str:
-        """Return a Processor's share of the time since the last line, and the deadlines it has missed."""
+        """Return a Processor's load since the last line, and the number of deadlines it has missed."""
         slot = module.config.slot
         busy = sum(item.statistics.total_ns for item in module.tasks)
         share = (busy - self._last_busy.get(slot, 0)) / passed_ns
@@ -263,7 +263,7 @@ class StatusDisplay:
 
 
 def _shown(item: CommonElement, value: Value) -> str:
-    """Return a value as the rack file means it: by its scale, with its unit; the unit `counts` goes without saying."""
+    """Return a value as the rack file declares it: scaled, with its unit; the unit `counts` is not shown."""
     variable = item.variable
     text = value_text(value)
     if variable.scale is not None and isinstance(value, int):

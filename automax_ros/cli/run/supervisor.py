@@ -1,4 +1,4 @@
-"""Keeps the processes of a distributed rack running: starts them, starts again what died, ends all in order."""
+"""Supervises the processes of a distributed rack: starts them, restarts those that died, ends all cleanly."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from automax_ros.cli.run.status import Progress
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 
 BACKOFFS_NS = (100 * NS_PER_MS, NS_PER_S)
-"""How long after its death a process is started again: the first one in ``WINDOW_NS``, the second (decision)."""
+"""Delay before a process is restarted after its first and its second death within ``WINDOW_NS`` (decision)."""
 MOST_DEATHS = 3
-"""This many deaths within ``WINDOW_NS`` and a process is given up: it would die again (decision)."""
+"""A process that died this many times within ``WINDOW_NS`` is given up: it would die again (decision)."""
 WINDOW_NS = 10 * NS_PER_S
-"""The time in which deaths count together (decision)."""
+"""Time within which deaths are counted together (decision)."""
 
 
 class Restarts:
     """The deaths of one process; times are ns of any one clock.
 
     Attributes:
-        count: how many there were.
-        given_up: whether it is not started again.
+        count: number of deaths.
+        given_up: whether the process is not started again.
     """
 
     def __init__(self) -> None:
-        """Begin with a process that has never died."""
+        """Create the record of a process that has not died."""
         self.count = 0
         self.given_up = False
         self._recent: deque[int] = deque(maxlen=MOST_DEATHS)
 
     def died(self, now_ns: int) -> int | None:
-        """Count a death; return when to start the process again, None where it is given up."""
+        """Count a death; return the time of the restart, None if the process is given up."""
         self.count += 1
         self._recent.append(now_ns)
         recent = sum(now_ns - died_ns < WINDOW_NS for died_ns in self._recent)
@@ -49,11 +49,11 @@ class Restarts:
 
 _LOOK_S = 0.05
 STAGE_NS = 800 * NS_PER_MS
-"""How long those who end first may take before the next are asked to, so that all have ended within 2 s."""
+"""Time that the processes of a stage have to end before those of the next are asked to; all end within 2 s."""
 END_NS = 10 * NS_PER_S
-"""Who has not ended so long after it was asked to is killed."""
+"""A process that has not exited this long after SIGTERM is killed."""
 GRACE_NS = 2 * NS_PER_S
-"""How long the others may take to reach the end that the first process has reached by itself."""
+"""Time that the other processes have to end by themselves after the first one has."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,12 @@ class ProcessSpec:
     """A process to keep running.
 
     Attributes:
-        name: what it is called.
-        command: starts it.
-        stage: those of the lowest stage end first; all others end when one of ``ends_run`` has.
+        name: its name in messages and reports.
+        command: the command line that starts it.
+        stage: processes of the lowest stage are ended first; all others end when one with ``ends_run`` has ended.
         ends_run: whether the run ends with it.
-        reports: whether it tells a report when it ends in order; without one it is never started again.
-        begins_run: whether the run, which ``ends_run`` tells of, cannot begin without it.
+        reports: whether it sends a report when it ends cleanly; one that does not is never restarted.
+        begins_run: whether the run of the processes with ``ends_run`` cannot begin without it.
     """
 
     name: str
@@ -78,27 +78,27 @@ class ProcessSpec:
 
 
 class Listener(Protocol):
-    """Who is told what processes say and how they fare."""
+    """Receives the messages and the deaths of processes."""
 
     def heard(self, name: str, told: ProcessMessage) -> None:
-        """A process has said something."""
+        """Receive a message of a process."""
         ...
 
     def complained(self, name: str, line: str) -> None:
-        """A process has written a line on standard error."""
+        """Receive a line that a process has written on standard error."""
         ...
 
     def died(self, name: str, how: str, again_s: float | None) -> None:
-        """A process has died; it is started again after a time (s), or not."""
+        """Receive the death of a process, which is restarted after ``again_s`` seconds, or not if that is None."""
         ...
 
 
 @dataclass
 class _Supervised:
-    """A post and who holds it.
+    """The state of one supervised process.
 
-    ``start_ns`` is when it is to be started, None where it is not. ``code`` is the exit code of one that is over.
-    ``has_begun``: it has told how it stands, once. ``reported``: it ends in order.
+    ``start_ns`` is when to start it, None where it is not to be started. ``code`` is the exit code of one that has
+    ended for good. ``has_begun``: it has sent its progress at least once. ``reported``: it has sent its report.
     """
 
     post: ProcessSpec
@@ -111,7 +111,7 @@ class _Supervised:
 
 
 class Supervisor:
-    """The processes of one run."""
+    """Runs the processes of one run."""
 
     def __init__(
         self,
@@ -121,7 +121,7 @@ class Supervisor:
         restart: bool = True,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Take what to keep running, first things first; nothing is started yet."""
+        """Create a supervisor of processes, which are started in this order by ``run``."""
         self._places = [_Supervised(post) for post in posts]
         self._listener, self._restart, self._clock = listener, restart, clock
         self._selector = selectors.DefaultSelector()
@@ -130,21 +130,21 @@ class Supervisor:
 
     @property
     def codes(self) -> dict[str, int]:
-        """The exit codes of processes that are over, by name: less than 0 where a signal has ended one."""
+        """Exit codes of ended processes, by name; less than 0 where a signal ended one."""
         return {place.post.name: place.code for place in self._places if place.code is not None}
 
     @property
     def deaths(self) -> dict[str, int]:
-        """How often processes have died, by name."""
+        """Number of deaths of each process that has died, by name."""
         return {place.post.name: place.restarts.count for place in self._places if place.restarts.count}
 
     @property
     def pids(self) -> dict[str, int]:
-        """The ids of processes that live, by name."""
+        """Ids of running processes, by name."""
         return {place.post.name: place.child.pid for place in self._places if place.child is not None}
 
     def run(self, should_stop: Callable[[], bool]) -> None:
-        """Keep them running until all have ended, by themselves or asked to."""
+        """Start the processes and restart those that die, until all have ended by themselves or ``should_stop``."""
         try:
             while any(place.child is not None or place.start_ns is not None for place in self._places):
                 if should_stop():
@@ -184,7 +184,7 @@ class Supervisor:
         self._listener.heard(place.post.name, told)
 
     def _over(self, place: _Supervised, child: Child) -> None:
-        """Take leave of a process that has ended: in order, or not."""
+        """Handle the end of a process: record its exit code, restart it, or end the run."""
         for stream in (child.out, child.err):
             while stream in self._selector.get_map() and stream.read():
                 pass
@@ -194,10 +194,10 @@ class Supervisor:
         assert code is not None
         child.close()
         in_order = place.reported or not place.post.reports
-        # What cannot begin at all is not helped by another start: wrong usage, a rack with errors.
+        # A process that cannot begin at all would not begin at another start: wrong usage, a rack with errors.
         refused = code > 0 and not place.has_begun
         if in_order or self._stage >= 0 or refused:
-            # Who was asked to end before it could heed a signal has ended as it should.
+            # A process that got SIGTERM before it had its handler has ended as it should.
             place.code = 0 if code == -signal.SIGTERM and self._stage >= 0 else code
             keeps_from_beginning = place.post.begins_run and not self._has_begun
             if place.post.ends_run or not in_order or keeps_from_beginning:
@@ -217,7 +217,7 @@ class Supervisor:
         return any(place.has_begun for place in self._places if place.post.ends_run)
 
     def _end(self, grace_ns: int) -> None:
-        """Begin to end all, after a grace; a second time this does nothing."""
+        """Begin to end all processes after ``grace_ns``; a second call does nothing."""
         if self._stage < 0:
             self._stage = 0
             self._asked_ns = self._stage_ns = self._clock() + grace_ns
@@ -225,7 +225,7 @@ class Supervisor:
                 place.start_ns = None
 
     def _go_on_ending(self) -> None:
-        """Ask those of a stage to end once those before have, or have taken too long; kill who does not at all."""
+        """Send SIGTERM to a stage once the one before has ended or taken too long; kill processes that remain."""
         now = self._clock()
         if self._stage < 0 or now < self._asked_ns:
             return
@@ -242,7 +242,7 @@ class Supervisor:
 
 
 def _how(code: int) -> str:
-    """Return in words how a process has died."""
+    """Return the cause of a process's death in words."""
     if code >= 0:
         return f"ended with exit code {code}"
     try:

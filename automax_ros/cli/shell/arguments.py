@@ -1,4 +1,4 @@
-"""Every subcommand with its arguments, as data: for the pages of the reference and for the shells' completion."""
+"""Every subcommand with its arguments, as data: for the reference pages and for shell completion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from automax_ros.cli.main import SUBCOMMANDS, module_of, parsers
 
 @dataclass(frozen=True)
 class Option:
-    """An option with all its names; ``values`` are the words that it takes, () where it takes others or none."""
+    """An option with all its names; ``values`` are its choices, () where it has none."""
 
     names: tuple[str, ...]
     takes_value: bool
@@ -22,7 +22,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Command:
-    """A subcommand: its words after ``automax``, what it is for, what it takes; ``inner`` are its own subcommands."""
+    """A subcommand: its words after ``automax``, its purpose, its arguments; ``inner`` are its own subcommands."""
 
     words: tuple[str, ...]
     title: str
@@ -33,7 +33,7 @@ class Command:
     inner: tuple[Command, ...]
 
     def all(self) -> Iterator[Command]:
-        """Yield it and the subcommands in it."""
+        """Yield the command and the subcommands in it."""
         yield self
         for command in self.inner:
             yield from command.all()
@@ -83,5 +83,5 @@ def _option(action: argparse.Action) -> Option:
 
 
 def _values_of(action: argparse.Action) -> dict[str, object]:
-    """Return what the help of an option may name, as argparse has it."""
+    """Return the values that argparse substitutes in the help of an option."""
     return {**vars(action), "prog": "automax"}

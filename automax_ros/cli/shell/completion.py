@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def bash(found: Sequence[Command]) -> str:
-    """Return the script for bash 4 or later: readline shows words without their meaning."""
+    """Return the script for bash 4 or later; readline shows words without descriptions."""
     every = [inner for command in found for inner in command.all()]
     choices = [
         f'        "{_path(command)} {name}") words={_quoted(option.values)} ;;'
@@ -108,11 +108,11 @@ end
 
 
 SHELLS: dict[str, Callable[[Sequence[Command]], str]] = {"bash": bash, "zsh": zsh, "fish": fish}
-"""What is made for each shell."""
+"""The function that returns the script for each shell."""
 
 
 def _path(command: Command) -> str:
-    """Return the words of a subcommand as the scripts gather them: each with a blank before it."""
+    """Return the words of a subcommand as the scripts collect them: each with a blank before it."""
     return "".join(f" {word}" for word in command.words)
 
 
@@ -149,7 +149,7 @@ def _fish_option(option: Option) -> str:
 
 
 def _fish_text(text: str) -> str:
-    """Return a text in quotes as fish reads them: a backslash stands before a quote, not outside of the quotes."""
+    """Return a text in fish's quotes: a quote in it is escaped by a backslash, within the quotes."""
     plain = " ".join(text.split()).replace("\\", "\\\\").replace("'", "\\'")
     return f"'{plain}'"
 

@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print what is asked about one block or all of them."""
+    """Print the description or the template of one block or of all."""
     if arguments.name is None:
         every = CATALOGUE.values()
         sys.stdout.write(templates(every) if arguments.template else summary(every))

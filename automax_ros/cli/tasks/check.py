@@ -30,16 +30,16 @@ from automax_ros.core.problems import Severity
 from automax_ros.core.text import count_of, printable
 
 _OF_OLD_PLANTS = ("AMX0003", "AMX0006", "AMX0021", "AMX2016", "AMX4008")
-"""What `automax convert` mends."""
+"""The problems that `automax convert` corrects."""
 _LINE_NUMBER = re.compile(r"\s*([0-9]{1,6})")
 
 
 @dataclass(frozen=True)
 class _Findings:
-    """What was found in one text.
+    """The findings in one text.
 
-    ``unconfirmed`` are the places of forms that no source confirms, ``size`` says what a rack consists of. A text that
-    is not ``usable`` counts as unreadable, although there is something to show of it.
+    ``unconfirmed`` are the places of forms that no source confirms, ``size`` lists what a rack consists of. A text that
+    is not ``usable`` counts as unreadable, although it has diagnostics to show.
     """
 
     source: SourceText
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check all files; one that cannot be read does not keep the others from being checked."""
+    """Check all files, also those after one that cannot be read."""
     target = target_of(arguments)
     _refuse_idle_options(arguments)
     findings: list[_Findings] = []
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_idle_options(arguments: argparse.Namespace) -> None:
-    """Refuse ``--target`` and ``--tick-ms`` where no file heeds them: a rack file says itself what runs its tasks."""
+    """Refuse ``--target`` and ``--tick-ms`` if all files are rack files, which define what runs their tasks."""
     given = arguments.tick_ms is not None or arguments.target != Platform.AUTOMAX.value
     if given and all(map(is_rack_file, arguments.files)):
         raise UsageError("--target and --tick-ms are for tasks given by themselves", "a rack file has `tick_ms:`")
@@ -102,7 +102,7 @@ def _task_file(path: Path, target: Target) -> list[_Findings]:
 
 
 def _naming_convert(source: SourceText, diagnostics: list[Diagnostic]) -> list[Diagnostic]:
-    """Return the findings; the hint of the first that only a source of an old plant has names the command for it."""
+    """Return the diagnostics; the first one that is typical of an old plant's source gets `automax convert` as hint."""
     first = next((number for number, item in enumerate(diagnostics) if item.code in _OF_OLD_PLANTS), None)
     if first is None:
         return diagnostics
@@ -113,12 +113,12 @@ def _naming_convert(source: SourceText, diagnostics: list[Diagnostic]) -> list[D
 
 
 def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
-    """Return what is wrong with the rack file, then with each of its tasks.
+    """Return the findings in the rack file, then in each of its tasks.
 
     Raises:
         UsageError: the rack file itself cannot be read.
     """
-    # Whoever checks a task alone need not wait until the reader of racks is loaded.
+    # Imported here, so that checking a task alone does not load the reader of racks.
     from automax_ros.cli.options.rack import is_text, load_rack_file, size_of
     from automax_ros.rackfile.checks.cpu_load import late_loops, loads_of
     from automax_ros.rackfile.checks.tasks import check_tasks, forgotten
@@ -144,7 +144,7 @@ def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
 
 
 def _each_once(findings: list[_Findings]) -> list[_Findings]:
-    """Return the findings without those that a task has by itself and in a rack, or in two places of a rack."""
+    """Return the findings without duplicates, which a task has if checked alone and in a rack, or twice in a rack."""
     seen: set[tuple[str, Diagnostic | tuple[Span, str]]] = set()
 
     def new(item: Diagnostic | tuple[Span, str], name: str) -> bool:
@@ -192,7 +192,7 @@ def _overlap(one: Span, other: Span) -> bool:
 
 
 def _note(span: Span, text: str, lines: list[str], source: SourceText) -> dict[str, object]:
-    """Return the object that marks a form which no source confirms: it is not a problem and has no code."""
+    """Return the object that marks a form confirmed by no source: it is not a problem and has no code."""
     return {
         "file": source.name,
         **dataclasses.asdict(span),
@@ -205,7 +205,7 @@ def _note(span: Span, text: str, lines: list[str], source: SourceText) -> dict[s
 
 
 def _statement(line: int, lines: list[str]) -> int | None:
-    """Return the BASIC line number in force on a physical line; lines after an ``&`` have none of their own."""
+    """Return the BASIC line number of a physical line; a line after an ``&`` has that of the line it continues."""
     while line > 1 and lines[line - 2].rstrip().endswith("&"):
         line -= 1
     number = _LINE_NUMBER.match(lines[line - 1])

@@ -8,7 +8,7 @@ from automax_ros.cli.tasks import compare_pulse
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``automax compare``: one word that says what is compared, and that comparison's own."""
+    """Add the arguments of ``automax compare``: a word for what is compared, and the arguments of that comparison."""
     comparisons = parser.add_subparsers(title="what to compare", metavar="WHAT", required=True)
     pulse = comparisons.add_parser(
         "pulse",

@@ -32,7 +32,7 @@ from automax_ros.logix.pulse_comparison import DEFAULT_MULTIPLIER, Pair, PulseCo
 
 @dataclass(frozen=True)
 class Report:
-    """A comparison that has ended, with the names of its file and columns."""
+    """A finished comparison, with the names of its file and columns."""
 
     input: str
     column: str
@@ -42,7 +42,7 @@ class Report:
 
     @property
     def rows(self) -> list[tuple[str, Pair]]:
-        """What differs and the totals at the end, in words."""
+        """The differences and the totals at the end, each with its title."""
         result = self.comparison
         rows = [
             ("first output that differs", result.first_output),
@@ -72,7 +72,7 @@ def report_text(report: Report) -> str:
 
 
 def json_text(report: Report) -> str:
-    """Return the report as one JSON object; what does not differ is null."""
+    """Return the report as one JSON object; differences that do not exist are null."""
     parameters, result = report.parameters, report.comparison
     tag = parameters.pmul()
     record = {
@@ -147,11 +147,11 @@ def _table(rows: list[tuple[str, Pair]]) -> list[str]:
 
 
 _ROWS_A_LOOK = 256
-"""Rows between two looks at the clock for the progress bar."""
+"""Rows between two updates of the progress bar."""
 _MOST_NAMES = 12
-"""Names of columns in one message."""
+"""Most column names in one message."""
 _MOST_GUESSES = 1000
-"""Most names of columns that are searched for a similar one (decision: a header may have half a million)."""
+"""Most column names that are searched for a similar one (decision: a header may have half a million)."""
 _HEADER = (
     "scan", "feedback", "reset", "pulse_mult", "pmul", "difference",
     "pulse_mult_total", "pmul_total", "total_difference",
@@ -173,7 +173,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compare; 0 without a difference, 1 with one, 2 where the table is at fault."""
+    """Compare; 0 without a difference, 1 with one, 2 where the table is wrong."""
     parameters = _parameters(arguments)
     require_different_files({"--input": arguments.input}, {"--output": arguments.output})
     comparison = PulseComparison(parameters)
@@ -192,7 +192,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Columns:
-    """Names of the two columns, and where they stand in a row."""
+    """The names of the two columns, and their positions in a row."""
 
     feedback: str
     feedback_at: int
@@ -219,11 +219,11 @@ def _number(option: str, text: str) -> int:
 
 
 def _columns(table: CsvTable, arguments: argparse.Namespace) -> _Columns:
-    """Return the columns that the options mean.
+    """Return the columns that the options choose.
 
     Raises:
-        UsageError: no such column, or several to choose from.
-        CsvFault: two columns of that name.
+        UsageError: there is no such column, or there are several candidates.
+        CsvFault: two columns have that name.
     """
     names = [name.strip() for name in table.header]
     reset_at = None if arguments.reset is None else _position(table, names, "--reset", arguments.reset)
@@ -242,7 +242,7 @@ def _columns(table: CsvTable, arguments: argparse.Namespace) -> _Columns:
 
 
 def _position(table: CsvTable, names: list[str], option: str, wanted: str) -> int:
-    """Return where a column stands; case and blanks around do not matter, as in all names of the rack."""
+    """Return the position of a column; case and surrounding blanks are ignored, as in all names of the rack."""
     places = [place for place, name in enumerate(names) if name.casefold() == wanted.strip().casefold()]
     if not places:
         hint = (
@@ -262,7 +262,7 @@ def _list(names: list[str]) -> str:
 def _compare(
     comparison: PulseComparison, table: CsvTable, columns: _Columns, output: TextIO | None, bar: ProgressBar
 ) -> None:
-    """Run both over the table and write each scan into the output."""
+    """Run block and instruction over the table, and write each scan to the output."""
     writer = None if output is None else csv.writer(output, lineterminator="\n")
     if writer is not None:
         writer.writerow(_HEADER)
@@ -294,7 +294,7 @@ def _scans(table: CsvTable, columns: _Columns) -> Iterator[tuple[int, bool]]:
     """Yield feedback and reset of each row.
 
     Raises:
-        CsvFault: a cell of these columns is not an INTEGER or not a BOOLEAN, or a row is at fault.
+        CsvFault: a cell of these columns is not an INTEGER or not a BOOLEAN, or a row is wrong.
     """
     feedback, reset = 0, False
     for line, cells in table.numbered_rows():
@@ -317,7 +317,7 @@ def _wrong_cell(table: CsvTable, column: str, cell: str, takes: str, line: int, 
 
 
 def _unsigned_hint(cell: str) -> str | None:
-    """Return what to do with a word that a logger wrote without sign."""
+    """Return a hint for a word that a logger wrote without sign, None for other cells."""
     value = value_of(cell, DataType.DOUBLE)
     if isinstance(value, int) and INT16_MAX < value <= 0xFFFF:
         return f"as a word of 16 bits this is {value - 0x10000}"

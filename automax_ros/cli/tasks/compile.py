@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the generated functions, or what is wrong with the task."""
+    """Print the generated functions, or the errors of the task."""
     source, result = check_task_file(arguments.file, target_of(arguments))
     if result.program is None:
         print_diagnostics(result.diagnostics, source, sys.stderr)

@@ -22,7 +22,7 @@ from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.recordings.mcap.whole_file import atomic_write
 
 KEPT_SUFFIX = ".orig"
-"""What --write adds to the name under which it keeps the old file."""
+"""Suffix that --write appends to the name of the old file."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Convert all files, print what changes, and write where that was asked for."""
+    """Convert all files, print the changes, and write the files if requested."""
     target = target_of(arguments)
     places = _places(arguments.files, arguments.output)
     converted = [(path, _converted(path, target)) for path in arguments.files]
@@ -65,7 +65,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _places(files: list[Path], folder: Path | None) -> dict[Path, Path]:
-    """Return where the converted files go; two of one name, or a file in the folder's place, are refused before."""
+    """Return where each converted file is written.
+
+    Raises:
+        UsageError: two files have one name, a file exists already, or the folder is a file.
+    """
     if folder is None:
         return {}
     if folder.exists() and not folder.is_dir():
@@ -91,7 +95,7 @@ def _converted(path: Path, target: Target) -> Converted:
 
 
 def _difference(path: Path, result: Converted) -> Iterator[str]:
-    """Yield a unified diff; what cannot be printed is shown by its code."""
+    """Yield a unified diff; unprintable characters are shown by their codes."""
     names = (str(path), f"{path} (converted)")
     before, after = (text.split("\n") for text in (result.before, result.after))
     for line in difflib.unified_diff(before, after, *names, lineterm=""):

@@ -18,7 +18,7 @@ from automax_ros.core.text import quoted
 
 _CODE = re.compile(r"(?:AMX)?([0-9]{4})")
 _NEAR = 3
-"""How many codes are offered in place of an unknown one."""
+"""Number of codes suggested for an unknown one."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _problems(text: str) -> list[Problem]:
-    """Return the problem with a code, or those that the hardware reports under it."""
+    """Return the problem with a code, or those that the hardware reports with this code."""
     asked = text.strip().upper()
     match = _CODE.fullmatch(asked)
     problem = PROBLEMS.get(f"AMX{match[1]}") if match else None
@@ -50,7 +50,7 @@ def _problems(text: str) -> list[Problem]:
 
 
 def _near(asked: str, number: int | None) -> str:
-    """Return the hint for an unknown code: the nearest numbers, or the problems whose titles hold the word."""
+    """Return the hint for an unknown code: the nearest numbers, or the problems whose titles contain the word."""
     if number is not None:
         nearest = sorted(PROBLEMS.values(), key=lambda item: (abs(item.number - number), item.number))[:_NEAR]
     else:
@@ -66,7 +66,7 @@ def _line(problem: Problem) -> str:
 
 
 def _page(problem: Problem, *, colour: bool) -> str:
-    """Return a page without its marks: headings as plain lines, fenced texts indented."""
+    """Return a page without its Markdown: headings as plain lines, fenced blocks indented."""
     text = (
         resources.files("automax_ros.core").joinpath("pages").joinpath(f"{problem.code}.md").read_text(encoding="utf-8")
     )

@@ -28,7 +28,7 @@ from automax_ros.tuning.tuning import Tuning
 _PICTURES = (".png", ".svg", ".pdf")
 _POINTS, _POINTS_DRAWN, _MOST_POINTS = 12, 30, 500
 _LOWEST_SHARE, _HIGHEST_SHARE = 1.0 / 30.0, 0.95
-"""The frequencies without --from and --to: from a share of the lowest corner to a share of Nyquist."""
+"""The frequency range without --from and --to: from a share of the lowest corner to a share of Nyquist."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure the block and show what was measured; 1 if the task has errors."""
+    """Measure the block and show its responses; 1 if the task has errors."""
     _check(arguments)
     program = checked_program(arguments)
     if program is None:
@@ -124,7 +124,7 @@ def _require_known(call: DynamicCall, tuning: Tuning) -> None:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    """Refuse what can be refused without the task."""
+    """Refuse wrong options that can be recognized without the task."""
     if arguments.amplitude is not None and not 1 <= arguments.amplitude <= INT16_MAX:
         raise UsageError(f"--amplitude {arguments.amplitude}: it must be 1 to {INT16_MAX} counts")
     if arguments.step is not None and not 1 <= abs(arguments.step) <= INT16_MAX:
@@ -141,7 +141,7 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def _range(arguments: argparse.Namespace, tuning: Tuning) -> Range:
-    """Return the frequencies to measure at."""
+    """Return the range of frequencies to measure at."""
     nyquist = tuning.nyquist_rad_s
     for name, value in (("--from", arguments.low), ("--to", arguments.high)):
         if value is not None and value >= nyquist:

@@ -1,4 +1,4 @@
-"""The picture of ``automax response --output``: step response, gain and phase, measured next to both designs."""
+"""The picture of ``automax response --output``: step response, gain and phase, measured and by both designs."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from automax_ros.tuning.response import BlockResponse, Point, followed
 _LAPLACE, _DESIGN, _MEASURED, _MARK = "#d1892f", "#1f4e9c", "black", "#7a7a7a"
 _CURVE, _STEPS, _TIMES = 300, 2000, 400
 _NEAR_A_MARK = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064)
-"""Where a curve has further points next to a corner, as shares of it: a notch is narrow."""
+"""Distances of additional points from a corner, as shares of its frequency: a notch is narrow."""
 _LOWEST_DB = -100.0
-"""Gains below are drawn here."""
+"""Lower gains are drawn at this level."""
 
 
 def require_matplotlib() -> None:
@@ -135,7 +135,7 @@ def _is(point: Point, reliable: bool) -> bool:
 
 
 def _draw_points(gain: Any, phase: Any, points: list[Point], label: str, *, reliable: bool) -> None:
-    """Draw measured points, uncertain ones hollow with what they may be off."""
+    """Draw measured points; uncertain ones are hollow and have error bars."""
     if not points:
         return
     style: dict[str, Any] = {
@@ -161,7 +161,7 @@ def _draw_points(gain: Any, phase: Any, points: list[Point], label: str, *, reli
 
 
 def _bar(point: Point) -> tuple[float, float]:
-    """Return how far a gain in dB may be off downwards and upwards, downwards not beyond the picture."""
+    """Return the uncertainty of a gain downwards and upwards, dB; downwards not beyond the picture."""
     assert point.measured is not None
     size, doubt = abs(point.measured.gain), point.measured.uncertainty
     level = _level(point.measured.gain)
@@ -195,7 +195,7 @@ def _level(gain: complex) -> float:
 
 
 def _angle(gain: complex, degrees: float) -> float:
-    """Return a phase, nothing to draw where there is no signal."""
+    """Return a phase, NaN (not drawn) where there is no signal."""
     return degrees if abs(gain) > 1e-9 else math.nan
 
 

@@ -1,4 +1,4 @@
-"""The responses of a block as tables: for a person, for a spreadsheet, as JSON."""
+"""The responses of a block as text tables, as CSV and as JSON."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def report(response: BlockResponse) -> str:
 
 
 def notes(response: BlockResponse) -> str:
-    """Return what a picture does not tell."""
+    """Return the text to print with a picture: heading, summary of the step, legend."""
     return _heading(response) + _step_summary(response) + _legend(response)
 
 
@@ -69,7 +69,7 @@ def _step(response: BlockResponse) -> str:
 
 
 def step_places(scans: int, rows: int) -> list[int]:
-    """Return the scans to show of a response: all of a short one, else nearer together at the beginning."""
+    """Return the scans of a response to show: all of a short one, else denser at the beginning."""
     if scans <= rows:
         return list(range(scans))
     return sorted({round((scans - 1) * (row / (rows - 1)) ** 2) for row in range(rows)})
@@ -131,7 +131,7 @@ def _legend(response: BlockResponse) -> str:
 
 
 def _may_be_smaller(found: Sequence[Measured]) -> bool:
-    """Return whether a smaller sine could keep off what the block ran into: nothing gets by a MAX_CHANGE of 0."""
+    """Return whether a smaller sine could avoid the limits that were reached; it cannot avoid a MAX_CHANGE of 0."""
     return any(item.amplitude > 1 and item.touched and STANDING not in item.touched for item in found)
 
 
@@ -190,7 +190,7 @@ def _without(item: dict[str, object], key: str) -> dict[str, object]:
 
 
 def _step_records(response: BlockResponse) -> list[dict[str, object]]:
-    """Return the samples of the step response: every scan, or of a long one as many as a table holds."""
+    """Return the samples of the step response: every scan, or at most as many as a table has rows."""
     step = response.step
     every = -(-len(step.output) // _MOST_ROWS)
     places = range(0, len(step.output), every)

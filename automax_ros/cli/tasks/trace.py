@@ -43,9 +43,9 @@ from automax_ros.scenario.stimuli.values import goes_on_for_ever
 _USAGE = "usage: automax trace FILE --input IN.csv, or: automax trace FILE --stimuli FILE"
 _NAMED = 20
 _CHARACTERS_A_ROW = 8
-"""For how many characters of a table a scan is expected where it says nothing of its size (decision)."""
+"""Characters of a table per expected scan, where the number of rows is unknown (decision)."""
 _ROWS_A_LOOK = 256
-"""Rows between two looks at the clock for the progress bar."""
+"""Rows between two updates of the progress bar."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Trace the task; 1 if it has errors, stops or faults, 2 if the table or an option is at fault."""
+    """Trace the task; 1 if it has errors, stops or faults, 2 if the table or an option is wrong."""
     if arguments.input is None and arguments.stimuli is None:
         raise UsageError("nothing is given for the task to work on", _USAGE)
     target = target_of(arguments)
@@ -108,7 +108,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _expected_ns(arguments: argparse.Namespace, period_ns: int) -> int:
-    """Return about how long the task will scan: for the duration, or a row of the table for each few characters."""
+    """Return about how long the task will scan, ns: the duration, or an estimate from the size of the table."""
     if arguments.duration is not None:
         duration: int = arguments.duration
         return duration
@@ -157,7 +157,7 @@ class _Trace:
         return self._lone.task.status is Status.RUNNING
 
     def _show_printed(self) -> None:
-        """Pass on the lines of PRINT, apart from the table."""
+        """Print the lines of PRINT statements on standard error, apart from the table."""
         task = self._lone.task
         while task.printed:
             print(f"{task.name}: {printable(task.printed.popleft())}", file=sys.stderr)
@@ -185,7 +185,7 @@ def _watched(lone: StandaloneTask, names: list[str] | None) -> list[LoneVariable
 
 
 def _conclusion(lone: StandaloneTask, *, all_told: bool) -> int:
-    """Say on standard error what the table does not show, and return the exit code."""
+    """Print on standard error how the trace ended and errors that were not written, and return the exit code."""
     task, log = lone.task, lone.task.errors
     if log.first is not None and not all_told:
         first = f"the first: {log.first.describe()}" if log.count > 1 else log.first.describe()

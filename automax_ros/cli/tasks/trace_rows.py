@@ -1,4 +1,4 @@
-"""What ``automax trace --stimuli`` does before each scan: what the file says up to that time, then a row's cells."""
+"""The inputs of ``automax trace`` before each scan: stimuli up to that time, then the cells of a row."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from automax_ros.scenario.stimuli.stage import Stimulus
 
 _SCAN, _TIME = "scan", "time_s"
 _NOT_SET = (_SCAN, _TIME, "duration_ns", "skipped", "errors", "error_line", "error_code")
-"""Columns that tables of ``trace`` and ``export`` have, which set nothing."""
+"""Columns of ``trace`` and ``export`` tables that set no variable."""
 _SET, _NOT_SET_HERE = "in.", ("out.", "local.")
-"""How the columns of ``export --scans`` begin: what a scan saw is set, what came of it is not."""
+"""Prefixes of the columns of ``export --scans``: inputs of a scan are set, its results are not."""
 _LATEST_S = 10**10
-"""Times of day are below this, s."""
+"""Greatest ``time_s``; times of day are below it, s."""
 _LONGEST_NS = 10**6 * NS_PER_S
-"""A table lasts at most 11 days (decision): whoever wrote ms for s is told."""
+"""A table lasts at most 11 days (decision): a longer one probably has ms instead of s."""
 
 
 class InputTable(CsvTable):
-    """An open table. ``columns`` are the variables that the header names, in its order; None is not looked at."""
+    """An open table. ``columns`` are the variables that the header names, in its order, None for an ignored column."""
 
     def __init__(self, path: Path, task: StandaloneTask) -> None:
         """Open a table and read its header.
 
         Raises:
             UsageError: the file cannot be read.
-            CsvFault: the header is at fault.
+            CsvFault: the header is wrong.
         """
         super().__init__(path)
         self._period_ns = task.task.period_ns
@@ -51,14 +51,14 @@ class InputTable(CsvTable):
             raise
 
     def rows(self) -> Iterator[int]:
-        """Set the variables to each row's cells in turn, and yield the row's line before each scan.
+        """Set the variables to the cells of each row, and yield the row's line number before each scan.
 
-        An empty cell leaves its variable as it is. In a table with times, but without numbers of scans, a row is set
-        before the first scan at or after its time, counted from the first row's, and holds until the next one's.
+        An empty cell leaves its variable unchanged. In a table with times but no scan numbers, a row is applied before
+        the first scan at or after its time, counted from that of the first row, and holds until the next row.
 
         Raises:
-            UsageError: the file cannot be read any more.
-            CsvFault: a row is at fault.
+            UsageError: the file can no longer be read.
+            CsvFault: a row is wrong.
         """
         scans, first_ns, before_ns, last = 0, 0, -1, 0
         for line, cells in self.numbered_rows():
@@ -82,7 +82,7 @@ class InputTable(CsvTable):
             yield last
 
     def unset(self, task: StandaloneTask) -> list[str]:
-        """Return the commons that the task works on, does not write itself and has no column for."""
+        """Return the commons of the task that it does not write itself and that have no column."""
         given = {variable.symbol.name for variable in self.columns if variable is not None}
         written = lines_that_write(task.program)
         commons = (item.name for item in task.program.symbols.values() if item.scope is Scope.COMMON)
@@ -99,7 +99,7 @@ class InputTable(CsvTable):
         raise self.fault("AMX6803", f"time_s = {quoted(cell, marks='')}, it must be a time in s, 0 or more", line=line)
 
     def _decimal(self, cell: str, variable: LoneVariable) -> str:
-        """Return a cell with a decimal point, where the table may have a comma."""
+        """Return a cell with a decimal point in place of the comma of a table with semicolons."""
         return cell.replace(",", ".") if self.separator == ";" and variable.symbol.type is DataType.REAL else cell
 
     def _columns(self, task: StandaloneTask) -> list[LoneVariable | None]:
@@ -125,7 +125,7 @@ class InputTable(CsvTable):
         return list(columns.values())
 
     def _set(self, variable: LoneVariable, cell: str, line: int) -> None:
-        """Set a variable to what a cell says, on a line of the table."""
+        """Set a variable to the value of a cell, on a line of the table."""
         symbol = variable.symbol
         text = cell if symbol.type is DataType.STRING else cell.strip()
         if not text:
@@ -142,7 +142,7 @@ class InputTable(CsvTable):
 
 
 def _wanted(symbol: Symbol, *, tuned: bool) -> str:
-    """Return in words what a variable takes; ``tuned`` where its tuning limits are what matters."""
+    """Return in words which values a variable accepts: within its tuning limits if ``tuned``, else of its type."""
     if tuned and symbol.tuning is not None:
         return f"inside its tuning limits, {value_text(symbol.tuning.low)} to {value_text(symbol.tuning.high)}"
     return wanted(symbol.type, symbol.length)
@@ -155,16 +155,16 @@ def _header_hint(name: str) -> str | None:
 
 
 class StimulatedScans:
-    """Scans by the clock of a task alone, from 0 on: one for each row of a table, or as many as a duration has.
+    """Scans of a task without a rack, from time 0 on: one for each row of a table, or as many as a duration has.
 
     Without both the last scan is the first one at or after the end of the last entry (decision).
-    Entries of a scan's instant happen before its row is set, so a cell has the last word (decision).
+    Entries of a scan's instant happen before its row is set, so a cell overrides them (decision).
     """
 
     def __init__(
         self, lone: StandaloneTask, stimuli: Sequence[Stimulus], table: InputTable | None, duration_ns: int | None
     ) -> None:
-        """Take a table, a duration, or both: the shorter counts; without both the entries must come to an end."""
+        """Create the scans of a table, a duration, or the shorter of both; without both the entries must end."""
         self._period_ns = lone.task.period_ns
         self._scheduler = Scheduler()
         self._stimulation = StimuliPlayer(stimuli, self._scheduler)
@@ -174,20 +174,20 @@ class StimulatedScans:
 
     @property
     def size(self) -> int:
-        """How much there is to do, in units of ``position``; 0 where nobody knows."""
+        """The total amount, in units of ``position``; 0 where it is unknown."""
         return self._table.size if self._table is not None else self._most or 0
 
     @property
     def position(self) -> int:
-        """How much is done."""
+        """The amount that is done: bytes of the table, or scans."""
         return self._table.position if self._table is not None else self._done
 
     def begin(self) -> None:
-        """Let the entries of time 0 happen: before what stands before SCAN_LOOP."""
+        """Play the entries of time 0, before the statements before SCAN_LOOP are executed."""
         self._stimulation.begin()
 
     def rows(self) -> Iterator[int]:
-        """Yield a number before each scan, once everything is set for it."""
+        """Yield the scan's number, from 0, before each scan, after its inputs are set."""
         rows = iter(self._table.rows() if self._table is not None else count())
         for number in self._numbers():
             self._scheduler.run_until(number * self._period_ns + 1)

@@ -144,7 +144,7 @@ def degrees_of(gain: complex | None) -> float | None:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax tune-info``."""
-    # argparse before 3.14 takes -1e-3 for an option and asks for a number.
+    # argparse before 3.14 mistakes -1e-3 for an option and reports a missing number.
     parser._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
     parser.add_argument("file", nargs="?", type=Path, metavar="FILE", help="a task (.BLK)")
     add_target_arguments(parser)
@@ -157,7 +157,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print what is asked for; 1 if the task has errors."""
+    """Print the blocks or the KI; 1 if the task has errors."""
     if arguments.ki is None:
         if arguments.ticks is not None:
             raise UsageError("--ticks is for --ki", "a task says itself how many ticks its scan has")
@@ -180,7 +180,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def checked_program(arguments: argparse.Namespace) -> Program | None:
-    """Return the task, None after printing what is wrong with it."""
+    """Return the checked task; if it has errors, print them and return None."""
     source, result = check_task_file(arguments.file, target_of(arguments))
     if result.program is None or has_errors(result.diagnostics):
         print_diagnostics(result.diagnostics, source, sys.stderr)

@@ -1,4 +1,4 @@
-"""What ``automax tune-info`` prints for a person."""
+"""The text that ``automax tune-info`` prints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from automax_ros.tuning.tuning import Corner, LimitNow, Tuning, Verdict
 _LABEL = 12
 _WIDTH = 106
 _JOINED = "\u00a0"
-"""A blank at which no line is wrapped."""
+"""A blank at which lines are not wrapped."""
 _HINTS = {
     Verdict.NEAR_LOW: "! within 10 % of the low limit",
     Verdict.NEAR_HIGH: "! within 10 % of the high limit",
@@ -30,7 +30,7 @@ Found = Sequence[tuple[DynamicCall, Tuning]]
 
 
 def report(path: Path, program: Program, found: Found) -> str:
-    """Return what there is to know about all dynamic blocks of a task."""
+    """Return the report on all dynamic blocks of a task."""
     if not found:
         return f"{path}: no dynamic block (sections 36 and 41 to 50)\n"
     parts = [heading(path, program), *(_block(call, tuning, program) for call, tuning in found)]
@@ -85,7 +85,7 @@ def _inside(call: DynamicCall, tuning: Tuning) -> Rows:
 
 
 def _values(call: DynamicCall, tuning: Tuning) -> Rows:
-    """Yield where the values of variables come from."""
+    """Yield the variables of a block with their values and where these come from."""
     for name in call.coefficients:
         given = call.parameters[name]
         if not given.variable:
@@ -122,7 +122,7 @@ def _functions(tuning: Tuning, call: DynamicCall) -> Rows:
 
 
 def _coefficients(tuning: Tuning, digits: int) -> str:
-    """Return the coefficients that the block has at its order."""
+    """Return the coefficients that the block uses at its order."""
     order = tuning.values.get("ORDER", 9.0)
     shown = {name: value for name, value in tuning.coefficients.items() if name != "span"}
     return ", ".join(
@@ -133,7 +133,7 @@ def _coefficients(tuning: Tuning, digits: int) -> str:
 
 
 def _exact_at(tuning: Tuning, call: DynamicCall) -> str:
-    """Return where the discrete function is the Laplace function itself."""
+    """Return the frequency at which the discrete function equals the Laplace function."""
     own = tuning.declared.dynamics.exact_at
     if not own:
         return "2 / T: plain bilinear"
@@ -206,7 +206,7 @@ def _limit_cells(limit: LimitNow, given: Parameter | None, order: float | None) 
 
 
 def _formulas(limit: LimitNow, order: float | None) -> str:
-    """Return the formulas of a limit, nothing where they are numbers; of those by ORDER the one in force."""
+    """Return the formulas of a limit, empty if they are plain numbers; of formulas by ORDER, the one that applies."""
     low = limit.low_text
     if not any(text.count("T") or text.count("C") for text in (low, limit.high_text)):
         return ""
@@ -233,7 +233,7 @@ def _ratio(tuning: Tuning) -> Rows:
 
 
 def _period(tuning: Tuning, program: Program) -> Rows:
-    """Yield the time between executions of a block that is told it."""
+    """Yield the time between executions of a block that has it as a parameter."""
     name = tuning.declared.executed_every
     if not name:
         return

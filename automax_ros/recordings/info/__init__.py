@@ -1,1 +1,1 @@
-"""What a recording holds, counted from its messages."""
+"""The contents of a recording, counted from its messages."""

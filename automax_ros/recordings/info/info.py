@@ -1,6 +1,6 @@
-"""What a recording holds, counted from its messages: rack, tasks and scans, topics, files, and whether it is sound.
+"""The contents of a recording: rack, scans, topics and files, counted from its messages, and whether it is sound.
 
-How the tasks of a recording run, from the rack file and the sources that are stored inside.
+Also the facts of its tasks, from the rack file and the sources that are stored inside.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _OPERATION = "automax_msgs/msg/Operation"
 _STRING = "std_msgs/msg/String"
 _FILES_TOPIC = "/config"
 _NO_ERRORS = bytes(4)
-"""How a Scan ends that has no errors: with the length of an empty list."""
+"""End of a Scan without errors: the length of an empty list."""
 _PROGRESS_MASK = 0x3FF
 _NUMBER = re.compile(r"(\d{1,9})(?=\.mcap$)")
 REPAIR_HINT = "`automax bag repair` makes a whole recording of what is readable"
@@ -48,7 +48,7 @@ REPAIR_HINT = "`automax bag repair` makes a whole recording of what is readable"
 
 @dataclass
 class TopicInfo:
-    """A topic: how many messages of which type."""
+    """A topic: the type and the number of its messages."""
 
     type_name: str
     messages: int = 0
@@ -56,7 +56,7 @@ class TopicInfo:
 
 @dataclass
 class TaskInfo:
-    """The scans of a task: how many, the lowest and highest number, numbers left out, restarts, errors logged.
+    """The scans of a task: their count, lowest and highest number, missing numbers, restarts, logged errors.
 
     ``errors`` counts them by BASIC line and number of the problem.
     """
@@ -71,7 +71,7 @@ class TaskInfo:
     _before: int | None = None
 
     def count(self, number: int) -> None:
-        """Take a scan's number into account."""
+        """Count a scan by its number."""
         self.scans += 1
         if self._before is None:
             self.first = self.last = number
@@ -85,7 +85,7 @@ class TaskInfo:
 
 @dataclass
 class FileInfo:
-    """A data file: its size, its chunks, the bytes in them as stored and unpacked."""
+    """A data file: its size, its number of chunks, the bytes in them as stored and unpacked."""
 
     name: str
     size: int
@@ -106,10 +106,10 @@ class AttachmentInfo:
 
 @dataclass
 class BagInfo:
-    """What a recording holds. Stamps are nanoseconds; ``problems`` is empty where it is sound.
+    """The contents of a recording. Stamps are nanoseconds; ``problems`` is empty if it is sound.
 
-    ``texts`` are the rack's file and the sources of its tasks as they are stored inside. ``gaps`` says which writes are
-    missing, where that was checked.
+    ``texts`` are the rack's file and the sources of its tasks as stored inside. ``gaps`` lists missing writes, if they
+    were checked.
     """
 
     path: Path
@@ -129,7 +129,7 @@ class BagInfo:
 
     @property
     def gap_texts(self) -> list[str]:
-        """What is missing in it though it is sound: by its recorder's own word, its write log and its scans."""
+        """Gaps that do not make the recording unsound, from its recorder's data, its write log and its scans."""
         told = self.custom_data.get("gaps", "")
         found = [f"the recorder says: {told}"] if told else []
         scans = [f"{count_of(task.missing, 'scan')} of {name}" for name, task in self.tasks.items() if task.missing]
@@ -142,27 +142,27 @@ class BagInfo:
 
     @property
     def size(self) -> int:
-        """Bytes of all data files."""
+        """Size of all data files, in bytes."""
         return sum(file.size for file in self.files)
 
     @property
     def scans(self) -> int:
-        """Scans of all tasks."""
+        """Number of scans of all tasks."""
         return sum(task.scans for task in self.tasks.values())
 
     @property
     def compression(self) -> float | None:
-        """How many times more bytes the chunks hold than they take."""
+        """Ratio of the unpacked bytes of all chunks to their stored bytes, None without chunks."""
         stored = sum(file.stored_bytes for file in self.files)
         return sum(file.unpacked_bytes for file in self.files) / stored if stored else None
 
 
 def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None) -> BagInfo:
-    """Read a recording from its beginning to its end and count what it holds; checksums are verified on the way.
+    """Read a recording from its beginning to its end and count its contents; checksums are verified, too.
 
-    ``check`` decodes every message of a type that we know too, and looks whether the write log has gaps or goes back.
-    What is wrong with the recording is told in ``problems``; what can be read before that place is counted. Memory does
-    not grow with the recording.
+    ``check`` also decodes every message of a known type, and checks whether the write log has gaps or goes backwards.
+    Errors of the recording are in ``problems``; messages before an error are counted. Memory use does not grow with the
+    recording.
 
     Raises:
         BagError: there is no recording of ROS 2 in mcap files at the path.
@@ -192,7 +192,7 @@ def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None
         )
         before += entry.size
     if info.table is not None and info.first_stamp is not None and info.last_stamp is not None:
-        # A rack sends its files before its run begins; the recording of a run does not begin earlier.
+        # A rack sends its files before its run begins, but the recording of a run begins with the run.
         info.first_stamp = min(max(info.first_stamp, info.table.stamp), info.last_stamp)
     if check and not info.problems:
         _check(info, progress)
@@ -200,7 +200,7 @@ def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None
 
 
 def _data_files(info: BagInfo) -> list[Path]:
-    """The data files, even where metadata.yaml is missing or wrong."""
+    """Return the data files, even if metadata.yaml is missing or wrong."""
     try:
         reader = BagReader(info.path)
     except BagError as error:
@@ -220,7 +220,7 @@ def _in_order(path: Path) -> tuple[int, str]:
 
 
 def _with_repair(error: BagError) -> BagError:
-    """Point to the repair what it mends: not what is beyond the limits, nor what has a hint of its own."""
+    """Return the error with a hint to the repair, unless the repair does not help or the error has another hint."""
     if error.code == "AMX6814" or error.hint not in ("", TRUNCATED_HINT, DAMAGED_HINT, NO_BAG_HINT):
         return error
     return BagError(error.code, error.place, error.message, REPAIR_HINT)
@@ -280,7 +280,7 @@ def _keep_table(info: BagInfo, record: RawMessage) -> None:
 
 
 def _keep_sent_files(info: BagInfo, record: RawMessage) -> None:
-    """Keep the files that a rack has sent, for a recording that has none stored inside."""
+    """Keep the files that a rack has sent, for a recording without stored files."""
     with contextlib.suppress(CdrError, RackFilesError):  # another program's topic of that name
         message = decoder(_STRING)(record.data)
         assert isinstance(message, String)
@@ -306,11 +306,11 @@ def _count_attachment(info: BagInfo, record: Attachment) -> None:
 
 
 _MOST_TEXT = 1 << 18
-"""Longest rack file or source that is looked into, in bytes."""
+"""Longest rack file or source that is read, in bytes."""
 
 
 def _check(info: BagInfo, progress: Progress | None) -> None:
-    """Decode every message of a type that we know, and look whether all of it is sound."""
+    """Decode every message of a known type, and check whether the recording is sound."""
     reader = BagReader(info.path)
     if progress is not None:
         reader.on_progress = lambda share: progress((1 + share) / 2)
@@ -325,9 +325,9 @@ RACK_FILE = "rack.yaml"
 
 @dataclass(frozen=True)
 class TaskFacts:
-    """A task as the rack file and its source have it; None where the source is missing or has errors.
+    """A task by the rack file and its source; values are None if the source is missing or has errors.
 
-    ``ticks`` is None too for a task without TICKS, ``period_ns`` for one without a scan period.
+    ``ticks`` is also None for a task without TICKS, ``period_ns`` for one without a scan period.
     """
 
     slot: int
@@ -340,7 +340,7 @@ class TaskFacts:
 
 
 def task_facts(info: BagInfo) -> dict[str, TaskFacts]:
-    """Return the tasks of the rack by name; none where the recording stores no rack file without errors."""
+    """Return the tasks of the rack by name; none if the recording has no rack file without errors."""
     text = info.texts.get(RACK_FILE)
     config = load_stored(SourceText(RACK_FILE, text), Path(RACK_FILE)).config if text is not None else None
     if config is None:

@@ -1,1 +1,1 @@
-"""Recordings of a rack that runs elsewhere, made from its messages."""
+"""Recordings of a rack in another process, made from its messages."""

@@ -1,7 +1,7 @@
-"""Puts messages that came over several topics into the order in which they were sent.
+"""Sorts messages received on several topics into the order in which they were sent.
 
 ROS keeps the order within a topic only. A rack sends all its messages from one thread, each with the time of sending:
-these times are the order. A message is held back until whatever was sent before it must have come.
+these times give the order. A message is held until all messages sent before it must have arrived.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ _SENT = itemgetter(0)
 
 
 class SendOrder(Generic[Item]):
-    """Holds messages until ``hold_ns`` have passed here since one that was sent later was taken.
+    """Holds messages until ``hold_ns`` have passed on the local clock since one that was sent later was received.
 
-    Times of sending are compared with each other alone, times of here likewise: the clocks may differ.
+    Times of sending are compared only with each other, and so are local times: the clocks may differ.
     """
 
     def __init__(self, hold_ns: int) -> None:
@@ -31,14 +31,14 @@ class SendOrder(Generic[Item]):
         return len(self._waiting)
 
     def add(self, sent_ns: int, item: Item) -> None:
-        """Take a message that was sent at a time of the sender's clock."""
+        """Add a message that was sent at a time of the sender's clock."""
         self._waiting.append((sent_ns, item))
         self._newest = max(self._newest, sent_ns)
 
     def due(self, now_ns: int) -> list[tuple[int, Item]]:
-        """Return (time of sending, message) of those whose turn has come, in order.
+        """Return (time of sending, message) of the messages that need not be held longer, in order.
 
-        ``now_ns`` is the time here at which the look at the topics began that took the messages added last.
+        ``now_ns`` is the local time at which the reading of the topics began that received the messages added last.
         """
         self._marks.append((now_ns, self._newest))
         mark = -1
@@ -52,7 +52,7 @@ class SendOrder(Generic[Item]):
         return found
 
     def rest(self) -> list[tuple[int, Item]]:
-        """Return all that waits, in order."""
+        """Return all held messages, in order."""
         found = sorted(self._waiting, key=_SENT)
         self._waiting = []
         return found

@@ -1,9 +1,9 @@
-"""Records a running rack from outside: its messages, in the order in which they were sent, into a bag that replays.
+"""Records the messages of a running rack, in the order in which they were sent, into a bag that can be replayed.
 
-A recorder that joins late knows nothing of common memory until an image comes. Writes older than the image are dropped,
-newer ones follow it without a gap in their numbers, or else recording rests until the next image. What comes between
-two writes waits for the second: only its number proves that memory was as the bag tells it. A task's scans are recorded
-from one that holds all it latched (``full``), for the scans before it cannot be understood.
+A recorder that joins late knows nothing of common memory until it receives an image. Writes older than the image are
+dropped; newer ones must follow it without a gap in their numbers, or recording is suspended until the next image.
+Messages between two writes wait for the second: only its number proves that memory was as recorded. A task's scans are
+recorded from one with all latched values (``full``) on; earlier scans cannot be interpreted.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from automax_ros.recordings.write.recording import Recording
 from automax_ros.recordings.write.writer import MAX_STAMP, BagWriter, Channel
 
 SETTLE_NS = NS_PER_S
-"""When for so long no write has come, none is missing."""
+"""If no write is received for this long, none is missing."""
 LATE_NS = 10 * NS_PER_S
-"""How long a scan's write is waited for (decision): on a busy host the process of common memory may be late."""
+"""Longest wait for a scan's write (decision): on a busy host the process of common memory may be late."""
 MAX_PENDING = 100_000
 """Most messages that wait for the next write."""
 _RESTARTED = "the rack was started again"
@@ -46,10 +46,10 @@ _MALFORMED_NAMED = 3
 
 
 class LiveRecording(Recording):
-    """One recording of a running rack; ``take`` every message in order, ``close`` finishes the bag.
+    """One recording of a running rack; call ``take`` with every message in order, ``close`` finishes the bag.
 
-    ``failure`` says why the disk ended the recording, ``ended`` why the rack did; both None while all is well.
-    ``notes`` are lines for the person, to be taken out by the caller.
+    ``failure`` is why the disk ended the recording, ``ended`` why the rack did; both are None until then.
+    ``notes`` are lines for the user, which the caller removes.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class LiveRecording(Recording):
         """Create the bag with the rack's files in it. ``table`` is the VariableTable, ``tasks`` those to record.
 
         A further file begins with the first image after each multiple of ``split_ns`` of rack time, 0 for never, or
-        after the size that ``storage`` gives; the rack is asked for that image.
+        after the size that ``storage`` gives; that image is requested from the rack.
 
         Raises:
             RecordingError: the folder exists already or cannot be written.
@@ -114,7 +114,7 @@ class LiveRecording(Recording):
 
     @property
     def wants_image(self) -> bool:
-        """Whether recording rests until the rack sends an image, or the next file does."""
+        """Whether recording, or the next file, waits for an image from the rack."""
         return self._split_due if self._recording else self._image is None
 
     @property
@@ -124,12 +124,12 @@ class LiveRecording(Recording):
 
     @property
     def rests(self) -> bool:
-        """Whether something is not recorded, or could not be replayed, before the rack sends an image or states."""
+        """Whether something is not recorded, or cannot be replayed, until the rack sends an image or states."""
         return not self._recording or not all(track.ready for track in self._tasks.values())
 
     @property
     def lacks(self) -> list[str]:
-        """What the bag lacks for a replay without the repository."""
+        """The parts that the bag lacks for a replay without the repository."""
         waiting = [task for task, track in self._tasks.items() if not track.ready and self.first_stamp is not None]
         return lacking(self._files, self._tasks, self._wrong_sources, self._topics.left_out, waiting)
 
@@ -149,7 +149,7 @@ class LiveRecording(Recording):
         return (stamp - self._facts.stamp) / NS_PER_S
 
     def flush(self, passed_ns: int) -> None:
-        """Hand what is recorded to the operating system if its time is over: so long ago came the last message."""
+        """Hand the open chunk to the operating system if its time has passed, ``passed_ns`` after the last message."""
         self._flush(self.last_stamp + passed_ns)
 
     def close(self) -> None:
@@ -172,7 +172,7 @@ class LiveRecording(Recording):
         if not self._check_run(head.run_id):
             return
         if self._image is not None and head.sequence == self._image[1].sequence:
-            self._begin()  # no write came between the two, so none is missing
+            self._begin()  # there was no write between the two images, so none is missing
         missing = self._log.missing(head.sequence, image=True)
         if self._recording and missing <= 0:
             if not missing:
@@ -246,7 +246,7 @@ class LiveRecording(Recording):
 
     def _record_operation(self, topic: str, sent_ns: int, payload: bytes) -> None:
         stamp, run_id = timely(operation_head(payload))
-        if run_id == self._log.run_id and stamp >= (self.first_stamp or 0):  # older ones wait for late joiners too
+        if run_id == self._log.run_id and stamp >= (self.first_stamp or 0):  # late joiners receive older ones, too
             self._write(topic, sent_ns, stamp, payload)
 
     def _record_plant(self, topic: str, sent_ns: int, payload: bytes) -> None:
@@ -256,12 +256,12 @@ class LiveRecording(Recording):
     def _record_value(self, topic: str, sent_ns: int, payload: bytes) -> None:
         self.values += 1
         self._values_now[topic] = payload
-        # A value carries no stamp: it belongs to the instant of the message before, or came so much later.
+        # A value has no stamp: it belongs to the instant of the message before, or was sent this much later.
         later = max(0, sent_ns - self._last_sent) if self._last_sent else 0
         self._write(topic, 0, min(self.last_stamp + (later if later > NS_PER_S // 1000 else 0), MAX_STAMP), payload)
 
     def _keep(self, topic: str, sent_ns: int, payload: bytes) -> None:
-        """Let a message wait for the next write, which says whether one is missing before it."""
+        """Keep a message until the next write, which shows whether one is missing before it."""
         if self._recording or self._image is not None:
             self._pending.append((topic, sent_ns, payload))
             if sent_ns - self._proven_ns > SETTLE_NS or len(self._pending) >= MAX_PENDING:
@@ -272,7 +272,7 @@ class LiveRecording(Recording):
             self.dropped += topic == self._topics.scans
 
     def _prove(self, sent_ns: int) -> None:
-        """Record what waits: nothing is missing before this time."""
+        """Record the pending messages: nothing is missing before this time."""
         self._proven_ns, self._proves = sent_ns, True
         pending, self._pending = self._pending, []
         for topic, sent, payload in pending:
@@ -280,14 +280,14 @@ class LiveRecording(Recording):
         self._proves = False
 
     def _settle(self, *, at_end: bool = False) -> None:
-        """Record what waits though no write proves it, up to a scan that wrote: its write has not come."""
+        """Record pending messages without the proof of a write, up to a scan whose write has not been received."""
         pending, self._pending = self._pending, []
         if self._image is not None:
             self._begin()
         for number, (topic, sent, payload) in enumerate(pending):
             again = self._begins_anew(topic, payload)
             if again and not at_end and len(pending) < MAX_PENDING:
-                self._pending = pending[number:]  # a write or an image will tell whether it is the same run
+                self._pending = pending[number:]  # a write or an image will show whether it is the same run
                 return
             if not again and topic == self._topics.scans and has_written(payload, self._last_write):
                 if not at_end:
@@ -306,7 +306,7 @@ class LiveRecording(Recording):
                 self._note_malformed(topic, error)
 
     def _begins_anew(self, topic: str, payload: bytes) -> bool:
-        """Whether a scan or state is that of a task that was put into RUN again, in this run or a later one."""
+        """Whether a message is a scan or state of a task that was put into RUN again, in this run or a later one."""
         head = task_head(self._topics, topic, payload)
         track = None if head is None else self._tasks.get(head.task)
         return head is not None and track is not None and track.began_anew(head.scan, head.stamp)
@@ -319,12 +319,12 @@ class LiveRecording(Recording):
         self._pending.clear()
 
     def _begin(self) -> None:
-        """Record from the image on."""
+        """Begin to record with the image."""
         assert self._image is not None
         sent_ns, head, payload = self._image
         self._image = None
         if self._open_gap is not None:
-            # By now it is known how many writes the bag lacks: those that did not come, and those before the image.
+            # Now the number of writes that the bag lacks is known: the lost ones, and those before the image.
             number, self._open_gap = self._open_gap, None
             missing = self._log.missing(head.sequence, image=True)
             self.gaps[number] = replace(self.gaps[number], missing=missing)
@@ -347,7 +347,7 @@ class LiveRecording(Recording):
         self._next_split = origin + ((stamp - origin) // period + 1) * period
 
     def _split(self, stamp: int) -> None:
-        """Begin a further file, with all that is needed to read it alone but the image, which comes next."""
+        """Begin a further file, with all that is needed to read it alone except the image, which is written next."""
         self._plan_split(stamp)
         self._writer.split()
         self.files_begun += 1
@@ -358,7 +358,7 @@ class LiveRecording(Recording):
             track.begin_file()
 
     def _rest(self, stamp: int, missing: int) -> None:
-        """Wait for an image: writes did not come."""
+        """Suspend recording until the next image, after writes were lost."""
         self._open_gap = len(self.gaps)
         self._note_gap(Gap(stamp, "writes of common memory", missing), "recording goes on")
         self._recording, self._image = False, None
@@ -379,13 +379,13 @@ class LiveRecording(Recording):
             self.notes.append(f"left out a malformed message on {topic}: {error}")
 
     def _check_run(self, run_id: int) -> bool:
-        """Return whether a message is one of this run of the rack; a message of another run ends the recording."""
+        """Return whether a message is of this run of the rack; one of another run ends the recording."""
         if run_id != self._log.run_id:
             self._end(_RESTARTED)
         return run_id == self._log.run_id
 
     def _end(self, reason: str) -> None:
-        """End the recording with what still waits of this run."""
+        """End the recording after the pending messages of this run."""
         if self.ended is None:
             self._settle(at_end=True)
             self.ended = reason

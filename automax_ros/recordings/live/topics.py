@@ -1,7 +1,4 @@
-"""The topics of a running rack, as its VariableTable names them.
-
-What a recording made from outside says of itself, apart from its messages.
-"""
+"""The topics of a running rack, as named in its VariableTable, and the custom data of a live recording."""
 
 from __future__ import annotations
 
@@ -20,10 +17,10 @@ from automax_ros.rackfile.model.driven import driven_plants
 from automax_ros.rackfile.model.ros_names import JOINTS, plant_topic, topic_names
 
 MAX_VALUE_TOPICS = 2000
-"""Most topics of common variables that a recorder listens to (decision: ROS serves no more at the pace of scans)."""
+"""Most topics of common variables that a recorder subscribes to (decision: ROS serves no more at the pace of scans)."""
 
 MAX_PLANT_TOPICS = 100
-"""Most topics of plants that a recorder listens to (decision: a rack has far fewer drives)."""
+"""Most topics of plants that a recorder subscribes to (decision: a rack has far fewer drives)."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +32,15 @@ class TopicKind:
 
 
 class LiveTopics:
-    """Topics by name, of the rack whose namespace is ``space`` (with its slash, such as ``/pm1``)."""
+    """The topics, by name, of the rack with the namespace ``space`` (with its slash, such as ``/pm1``)."""
 
     def __init__(
         self, space: str, table: VariableTable | None = None, offered: Mapping[str, Collection[str]] | None = None
     ) -> None:
-        """Name the topics; without a table those of common variables are not known.
+        """Determine the topics; without a table those of common variables are unknown.
 
-        ``offered`` are the types of topics that the ROS graph has: the table does not say which variables have a scale,
-        and nothing of plants.
-        ``left_out`` is how many topics of common variables lie beyond the limit.
+        ``offered`` are the types of topics in the ROS graph: the table does not show which variables have a scale, nor
+        the plants. ``left_out`` is the number of topics of common variables beyond the limit.
         """
         self.variables = f"{space}/variables"
         self.snapshot = f"{space}/backplane/snapshot"
@@ -60,7 +56,7 @@ class LiveTopics:
 
     @classmethod
     def expected(cls, space: str, config: RackConfig) -> LiveTopics:
-        """Name the topics of a rack that need not be there yet, from its file."""
+        """Return the topics of a rack that need not run yet, from its file."""
         topics = cls(space)
         names = topic_names(variable.name for variable in config.variables)
         for variable in config.variables:
@@ -76,7 +72,8 @@ class LiveTopics:
     def in_order(self) -> list[str]:
         """Every topic, in the order of subscriptions.
 
-        The rack answers each new reader of the last three: an image first, then states and full scans that follow it.
+        The rack responds to each new subscriber of the last three: with an image first, then with states and full scans
+        that follow it.
         """
         first = [self.variables, self.backplane, *self.values, *self.plants, self.operations]
         return [*first, self.snapshot, self.scans, self.states]
@@ -97,7 +94,7 @@ class LiveTopics:
 
 
 def _values(space: str, table: VariableTable, offered: Mapping[str, Collection[str]]) -> dict[str, TopicKind]:
-    """The topics of common variables; a topic outside of the rack's ``common`` is none of a rack."""
+    """Return the topics of common variables, ignoring those outside of the rack's ``common``."""
     found = {}
     for variable in table.variables:
         type_name = _value_type_name(variable)
@@ -109,7 +106,7 @@ def _values(space: str, table: VariableTable, offered: Mapping[str, Collection[s
 
 
 def _plants(space: str, offered: Mapping[str, Collection[str]]) -> dict[str, TopicKind]:
-    """The topics of plants: their states, and the shafts of all."""
+    """Return the topics of plants: the state of each, and the joint states of all shafts."""
     state, joint = NAMES[PlantState], NAMES[JointState]
     begin = f"{space}/{plant_topic('')}"
     names = sorted(name for name, types in offered.items() if name.startswith(begin) and state in types)
@@ -127,7 +124,7 @@ def _value_type_name(variable: Variable) -> str | None:
 
 
 GAPS_NAMED = 20
-"""Gaps that the bag tells one by one; it tells the number of all."""
+"""Number of gaps that the bag lists; it also has the number of all."""
 
 
 def provenance(
@@ -138,7 +135,7 @@ def provenance(
     gaps: Sequence[str],
     ended: str | None,
 ) -> dict[str, str]:
-    """Return the custom data of the bag; times in s since the start of the run, None where there is nothing to say."""
+    """Return the custom data of the bag; times in s since the start of the run, None if not applicable."""
     data = {"rack": rack, "version": automax_ros.__version__, "recorder": "automax record"}
     if not any("file" in item or "source" in item for item in lacks):
         data["fingerprint"] = f"{fingerprint(files):016x}"
@@ -156,10 +153,10 @@ def provenance(
 def lacking(
     files: Sequence[RackFile], tasks: Iterable[str], wrong: Iterable[str], left_out: int, waiting: Iterable[str]
 ) -> list[str]:
-    """Return what a bag lacks for a replay without the repository.
+    """Return the parts that a bag lacks for a replay without the repository.
 
-    ``wrong`` are tasks that run another source than the stored one, ``left_out`` counts topics of commons, ``waiting``
-    are tasks that cannot be executed again yet.
+    ``wrong`` are tasks that run another source than the stored one, ``left_out`` counts omitted topics of commons,
+    ``waiting`` are tasks that cannot be executed again yet.
     """
     owners = {file.owner for file in files}
     wanted = {RACK_FILE: RACK_FILE, **{task: f"{task}.BLK" for task in tasks}}

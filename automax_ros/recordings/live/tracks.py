@@ -1,4 +1,4 @@
-"""How far the recording of a running rack has come with each task, and what did not come."""
+"""Progress of a live recording for each task, and gaps by lost messages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from automax_ros.recordings.write.writer import MAX_STAMP
 
 
 class Stamped(Protocol):
-    """A message, or its head, with the time at which it is true (ns)."""
+    """A message, or its head, with the time for which it holds (ns)."""
 
     @property
     def stamp(self) -> int:
@@ -27,7 +27,7 @@ def possible(stamp: int) -> int:
     """Return a stamp.
 
     Raises:
-        CdrError: no recording has a place for it: what has it is left out, and ends nothing.
+        CdrError: it cannot be recorded; a message with it is left out, and the recording continues.
     """
     if not 0 <= stamp <= MAX_STAMP:
         raise CdrError(f"{stamp} ns is not the time of a message")
@@ -35,14 +35,14 @@ def possible(stamp: int) -> int:
 
 
 def timely(message: _Stamped) -> _Stamped:
-    """Return a message, or its head, whose stamp is ``possible``."""
+    """Return a message, or its head, after checking that its stamp is ``possible``."""
     possible(message.stamp)
     return message
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Messages that did not come: what they were, how many (0: nobody knows), and the stamp where that was seen."""
+    """Lost messages: their kind, how many (0 if unknown), and the stamp at which the loss was found."""
 
     stamp: int
     what: str
@@ -54,10 +54,10 @@ class Gap:
 
 @dataclass
 class TaskProgress:
-    """What is recorded of one task: number and stamp of its last scan, the last scan that a state contains.
+    """The recorded part of one task: number and stamp of its last scan, number of the last scan with a state.
 
-    ``follows``: each scan since a full one is there. ``ready``: a state joins them, so they can be executed again.
-    ``alone``: that holds for the present file of a split recording too.
+    ``follows``: every scan since a full one is recorded. ``ready``: a state belongs to them, so they can be executed
+    again. ``alone``: that is true for the present file of a split recording, too.
     """
 
     last: int = -1
@@ -68,7 +68,7 @@ class TaskProgress:
     alone: bool = False
 
     def begin_file(self) -> None:
-        """Wait for a state in a further file; scans go on."""
+        """Wait for a state in a further file; scans continue."""
         self.state, self.alone = -1, False
 
     def rest(self) -> None:
@@ -78,7 +78,7 @@ class TaskProgress:
     def began_anew(self, scan: int, stamp: int, *, proven: bool = False) -> bool:
         """Whether a scan or state of this number and time belongs to a later run of the rack.
 
-        Where it is ``proven`` to be of this run, the task alone was put into RUN again, and counts from 0.
+        If it is ``proven`` to be of this run, only the task was put into RUN again, and counts from 0.
         """
         again = scan < self.last and stamp > self.stamp
         if again and proven:
@@ -86,13 +86,13 @@ class TaskProgress:
         return again and not proven
 
     def take_scan(self, scan: int, stamp: int) -> None:
-        """Note a scan that is full or follows the last one."""
+        """Record a scan that is full or follows the last one."""
         self.follows = True
         self._join(self.state == scan - 1)
         self.last, self.stamp = scan, stamp
 
     def take_state(self, scan: int) -> None:
-        """Note a state after a scan."""
+        """Record a state after a scan."""
         self.state = scan
         self._join(self.follows and scan == self.last)
 
@@ -101,7 +101,7 @@ class TaskProgress:
 
 
 def task_head(topics: LiveTopics, topic: str, payload: bytes) -> ScanHead | StateHead | None:
-    """Return the head of a scan or of a task's state; None for what is neither, or malformed."""
+    """Return the head of a scan or of a task's state; None for another or a malformed message."""
     try:
         if topic == topics.scans:
             return timely(scan_head(payload))
@@ -111,9 +111,9 @@ def task_head(topics: LiveTopics, topic: str, payload: bytes) -> ScanHead | Stat
 
 
 def has_written(payload: bytes, last_write: int) -> bool:
-    """Whether a scan wrote common memory and the write must follow: one that was pre-empted may have before.
+    """Whether a scan wrote common memory and its write must still follow; a pre-empted scan may have written before.
 
-    ``last_write`` is the stamp of the last write that came.
+    ``last_write`` is the stamp of the last write received.
     """
     try:
         scan: Any = decode("automax_msgs/msg/Scan", payload)

@@ -1,1 +1,1 @@
-"""The mcap file format and what a recording says of itself."""
+"""The mcap file format and the metadata of recordings."""

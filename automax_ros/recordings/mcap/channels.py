@@ -1,6 +1,6 @@
-"""The quality of service that a recording gives for a topic, in the words of rosbag2 or its older numbers.
+"""Checks of a channel's message definition against our decoders, and its recorded quality of service.
 
-Whether the messages of a recording have the definitions that our decoders expect.
+The quality of service is in the words of rosbag2 or in its older numbers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def require_known(file: Path, topic: str, schema: Schema | None) -> Schema:
     """Return the schema of a topic whose messages can be decoded here.
 
     Raises:
-        BagError: the type is not known, or was recorded with another definition.
+        BagError: the type is unknown, or was recorded with another definition.
     """
     name = schema.name[:_MAX_NAME] if schema else ""
     if schema is None or name not in message_types():
@@ -60,9 +60,9 @@ def is_known(schema: Schema | None) -> bool:
 MAX_QOS_BYTES = 1 << 16
 """Longest text of a recorded quality of service that is read, in bytes (decision: a bound on untrusted recordings)."""
 MAX_DEPTH = 10_000
-"""Deepest history that playback asks for, whatever was recorded (decision: ROS would hold as many messages)."""
+"""Greatest history depth that playback requests, whatever was recorded (decision: ROS would hold as many messages)."""
 STREAM = QosProfile("reliable", "volatile", "keep_last", 1000)
-"""What a topic gets for which nothing was recorded."""
+"""Quality of service of a topic for which none was recorded."""
 _KEEP_ALL_DEPTH = 1000
 _NESTING = 6
 _RELIABILITY = {"1": "reliable", "2": "best_effort"}
@@ -71,7 +71,7 @@ _HISTORY = {"1": "keep_last", "2": "keep_all"}
 
 
 def recorded_qos(text: str) -> QosProfile:
-    """Return the first profile of ``offered_qos_profiles``; what cannot be read is that of a stream."""
+    """Return the first profile of ``offered_qos_profiles``; values that cannot be read are those of ``STREAM``."""
     profiles = _loaded(text)
     profile = profiles[0] if isinstance(profiles, list) and profiles else None
     if not isinstance(profile, dict):
@@ -95,7 +95,7 @@ def _depth(profile: dict[Any, Any]) -> int:
 
 
 def _loaded(text: str) -> Any:
-    """Load YAML of bounded depth without aliases, None where the text is something else."""
+    """Return the data of YAML of bounded depth without aliases, None for any other text."""
     if len(text) > MAX_QOS_BYTES:
         return None
     try:

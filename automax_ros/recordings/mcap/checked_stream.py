@@ -1,4 +1,4 @@
-"""The bytes of a file, read in large pieces, with the checksum of what was taken."""
+"""The bytes of a file, read in large pieces, with the checksum of the bytes returned."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Container
 from typing import Any, BinaryIO
 
 PIECE_BYTES = 1 << 18
-"""What is read at once, in bytes (decision: records of 100 bytes cost what they are, not a read each)."""
+"""Bytes that are read at once (decision: records of 100 bytes cost what they are, not a read each)."""
 
 
 class CheckedStream:
-    """Takes bytes of a file one after the other; ``position`` counts them."""
+    """Returns the bytes of a file one after the other; ``position`` counts them."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -23,11 +23,11 @@ class CheckedStream:
 
     @property
     def position(self) -> int:
-        """How many bytes are taken."""
+        """Number of bytes returned or skipped so far."""
         return self._before + self._at
 
     def take(self, length: int) -> bytes:
-        """Return the next bytes, fewer where the file ends before."""
+        """Return the next bytes, fewer if the file ends earlier."""
         if self._at + length > len(self._buffer):
             self._fill(length)
         begin = self._at
@@ -35,7 +35,7 @@ class CheckedStream:
         return self._buffer[begin : self._at]
 
     def numbers(self, layout: struct.Struct) -> tuple[Any, ...]:
-        """Return the numbers that stand in the next bytes; none where the file ends before."""
+        """Return the numbers in the next bytes; none if the file ends earlier."""
         if self._at + layout.size > len(self._buffer):
             self._fill(layout.size)
             if layout.size > len(self._buffer):
@@ -45,7 +45,7 @@ class CheckedStream:
         return layout.unpack_from(self._buffer, self._at - layout.size)
 
     def pass_over(self, head: struct.Struct, kinds: Container[int]) -> None:
-        """Pass over records of some kinds, of which a head tells kind and length, as far as they are read whole."""
+        """Skip records of some kinds as far as they are in the buffer; a head has kind and length of each."""
         at, buffer = self._at, self._buffer
         while at + head.size <= len(buffer):
             kind, length = head.unpack_from(buffer, at)
@@ -55,7 +55,7 @@ class CheckedStream:
         self._at = at
 
     def skip(self, length: int) -> int:
-        """Pass over the next bytes; return how many there were."""
+        """Skip the next bytes; return how many there were."""
         if self._at + length > len(self._buffer):
             self._fill(length)
         begin = self._at
@@ -63,14 +63,14 @@ class CheckedStream:
         return self._at - begin
 
     def crc(self, without: int = 0) -> int:
-        """Return the CRC-32 of what was taken since ``begin_crc``, but for the last bytes, taken in one go."""
+        """Return the CRC-32 of the bytes since ``begin_crc``, except the last ``without``, which were read at once."""
         end = self._at - without
         self._crc = zlib.crc32(memoryview(self._buffer)[self._summed : end], self._crc)
         self._summed = end
         return self._crc
 
     def begin_crc(self) -> None:
-        """Begin with a checksum at the next byte."""
+        """Start the checksum at the next byte."""
         self._crc, self._summed = 0, self._at
 
     def _fill(self, length: int) -> None:

@@ -1,7 +1,7 @@
-"""The open chunk of a recording: records, and where its messages stand.
+"""The open chunk of a recording: its records, and an index of its messages.
 
-Messages are framed here, since they are most of the work of a recording, straight into the chunk: compiled, that
-takes 0.14 us for each, a packing by ``struct`` 0.32 us, and ``mcap.writer.Writer.add_message`` 4.2 us.
+Messages, which are most of the work of a recording, are framed here directly in the chunk: compiled, that takes
+0.14 us for each, packing by ``struct`` 0.32 us, and ``mcap.writer.Writer.add_message`` 4.2 us.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from automax_ros.messages.stream.task_messages import as_i16, as_i32, as_i64
 RECORD_HEAD = struct.Struct("<BQ")
 """Opcode and length of every record."""
 MESSAGE_FIELDS = struct.Struct("<HIQQ")
-"""Channel, sequence, log time and publish time: what a message begins with."""
+"""Beginning of a message: channel, sequence, log time and publish time."""
 _FIELDS: Final = MESSAGE_FIELDS.size
 _FRAME: Final = _FIELDS + RECORD_HEAD.size
 _MESSAGE_CODE: Final = int(Opcode.MESSAGE)
-"""A plain number: getting a member of an enumeration takes longer than all the rest."""
+"""A plain number: reading a member of an enumeration takes longer than all the rest."""
 
 
 class ChunkBuilder:
-    """The records of an open chunk: ``size`` bytes. Its index tells for each channel where the messages stand.
+    """The records of an open chunk, ``size`` bytes, with an index of the messages of each channel.
 
     ``first_time`` and ``last_time`` are the earliest and the latest log time; -1 without a message.
     """
@@ -36,7 +36,7 @@ class ChunkBuilder:
     __slots__ = ("_index", "_records", "first_time", "last_time", "size")
 
     def __init__(self, index: Mapping[int, Sequence[int]] | None = None) -> None:
-        """Begin without records; with an ``index``, as one that has the index of a chunk elsewhere."""
+        """Create a chunk without records; ``index`` is the index of a chunk that is stored elsewhere."""
         self._records = BytesWriter()
         self.size = 0
         self._index: dict[int, BytesWriter] = {}
@@ -51,7 +51,7 @@ class ChunkBuilder:
 
     @property
     def has_messages(self) -> bool:
-        """Whether there are messages."""
+        """Whether the chunk has messages."""
         return bool(self._index)
 
     @property
@@ -110,6 +110,6 @@ def record_bytes(record: McapRecord) -> bytes:
 
 
 def taken_bytes(builder: RecordBuilder) -> bytes:
-    """Return the bytes of a builder, which is empty then."""
+    """Return the bytes of a builder, and empty it."""
     data: bytes = builder.end()  # type: ignore[no-untyped-call]
     return data

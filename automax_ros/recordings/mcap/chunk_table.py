@@ -1,8 +1,7 @@
-"""An unpacked chunk whose messages are found without reading them one by one: by the index that stands after it.
+"""Unpacked chunks whose messages are found by the index after the chunk, without reading them one by one.
 
-The index is not trusted: it counts only where its messages and the chunk's own definitions fill the chunk without gaps.
-
-Where the chunks of a block are unpacked to: one after the other in a few megabytes.
+The index is not trusted: it is used only if its messages and the chunk's own definitions fill the chunk without gaps.
+The chunks of a block are unpacked one after the other into a buffer of a few megabytes.
 """
 
 from __future__ import annotations
@@ -20,11 +19,11 @@ from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEA
 from automax_ros.recordings.mcap.unpacking import Buffer
 
 BLOCK_BYTES = 16 << 20
-"""Bytes unpacked that a block has at most; a larger chunk is a block of its own (decision: a bound on memory)."""
+"""Most unpacked bytes of a block; a larger chunk is a separate block (decision: a bound on memory)."""
 
 
 class BlockBuffer:
-    """Gives room to chunks. A buffer that is full stays as it is, and another one is begun."""
+    """Provides buffers for unpacked chunks. A full buffer is not reused; a new one is created."""
 
     def __init__(self) -> None:
         self._filling = np.empty(0, np.uint8)
@@ -32,7 +31,7 @@ class BlockBuffer:
         self._given: deque[tuple[NDArray[np.uint8], int]] = deque()
 
     def room(self, size: int) -> memoryview:
-        """Return the room of the next chunk."""
+        """Return the memory for the next chunk."""
         if self._used + size > len(self._filling):
             self._filling, self._used = np.empty(max(BLOCK_BYTES, size), np.uint8), 0
         begin = self._used
@@ -41,12 +40,12 @@ class BlockBuffer:
         return self._filling.data[begin : self._used]
 
     def taken(self) -> tuple[NDArray[np.uint8], int]:
-        """Return the buffer of the chunk that was read next, and where it begins there."""
+        """Return the buffer of the next chunk in the order of ``room``, and where the chunk begins in it."""
         return self._given.popleft()
 
 
 _INDEX_HEAD = struct.Struct("<HI")
-"""Channel and bytes of the entries: what the content of a message index begins with."""
+"""Beginning of a message index's content: channel, and bytes of the entries."""
 _ENTRY = np.dtype([("log_time", "<u8"), ("place", "<u8")])
 _HEAD = np.dtype(
     [
@@ -58,20 +57,21 @@ _HEAD = np.dtype(
         ("publish_time", "<u8"),
     ]
 )
-"""What a message's record begins with."""
+"""Beginning of a message's record."""
 MESSAGE_HEAD = RECORD_HEAD.size + MESSAGE_FIELDS.size
-"""Bytes of its record that stand before a message itself."""
+"""Bytes of a record before the message itself."""
 Definition = tuple[int, int, bytes]
 """A schema or channel: the place of its record, its opcode and its content."""
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
 _MOST_DEFINITIONS = 10_000
 MOST_MESSAGES = 400_000
-"""A chunk with more messages than this is read one by one (decision: a bound on memory for untrusted recordings)."""
+"""The messages of a chunk with more than this are read one by one (decision: a bound on memory for untrusted
+recordings)."""
 
 
 @dataclass(frozen=True)
 class ChunkTable:
-    """Where the messages of a chunk stand, in the order of the file: ``numbers`` of their channels, lengths and times.
+    """The messages of a chunk in the order of the file: ``numbers`` of their channels, places, lengths and times.
 
     ``places`` are where their records begin. ``definitions`` are the schemas and channels: place, opcode, content.
     """
@@ -90,16 +90,16 @@ class ChunkTable:
 
 
 class WholeChunk:
-    """The unpacked bytes of a chunk, which ends at a ``place`` of the file, and the indexes that follow it there."""
+    """The unpacked bytes of a chunk, which ends at ``place`` in the file, and the indexes that follow it."""
 
     def __init__(self, data: Buffer, place: int = 0) -> None:
         self.data, self.place = data, place
         self._indexes: list[bytes] | None = []
         self._left = len(data) // MESSAGE_HEAD * _ENTRY.itemsize
-        """How many bytes entries can have at most."""
+        """Most bytes that further entries can have."""
 
     def add_index(self, content: bytes) -> None:
-        """Take the content of a message index; one that cannot be that of the chunk makes all of them count nothing."""
+        """Add the content of a message index; one that cannot be that of the chunk invalidates all of them."""
         if self._indexes is None or len(content) < _INDEX_HEAD.size:
             self._indexes = None
             return
@@ -111,7 +111,7 @@ class WholeChunk:
             self._indexes.append(content)
 
     def table(self) -> ChunkTable | None:
-        """Return where the messages stand; None where the indexes do not tell it for every byte of the chunk."""
+        """Return the table of the messages; None if the indexes do not account for every byte of the chunk."""
         if not self._indexes or sum(map(len, self._indexes)) > MOST_MESSAGES * _ENTRY.itemsize:
             return None
         parts = [np.frombuffer(content, _ENTRY, offset=_INDEX_HEAD.size)["place"] for content in self._indexes]
@@ -145,7 +145,7 @@ class WholeChunk:
         )
 
     def _definitions(self, gaps: Iterator[tuple[int, int]]) -> Iterator[Definition | None]:
-        """Return the records between messages; None for one that is neither schema nor channel."""
+        """Yield the records between messages; None for one that is neither schema nor channel."""
         for begin, end in gaps:
             position = begin
             while position < end:

@@ -1,4 +1,4 @@
-"""What can go wrong with a recording, as errors that say where and what to do."""
+"""Errors of recordings, which name the place and what to do."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from automax_ros.core.text import printable
 class BagError(UserError):
     """A recording cannot be read, understood or exported.
 
-    ``code`` is AMX68nn, ``place`` names the file or folder, ``hint`` is "" where there is nothing to do.
+    ``code`` is AMX68nn, ``place`` is the file or folder, ``hint`` is "" where there is nothing to do.
     """
 
     hint: str

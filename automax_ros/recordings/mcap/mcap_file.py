@@ -1,8 +1,8 @@
 """Reads one mcap file from its beginning to its end, trusting nothing in it.
 
-Memory stays bounded whatever the file says: a length is compared with the limit and with what is there before anything
-is read or decompressed. Every checksum that the file has is verified: before the messages of a chunk are handed out,
-and at the end for the rest.
+Memory stays bounded whatever the file states: a length is compared with the limit and with the bytes available before
+anything is read or decompressed. Every checksum in the file is verified: those of chunks before their messages are
+returned, the others at the end.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from automax_ros.recordings.mcap.opening import NO_BAG_HINT, opened
 from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Buffer, Room, Unpacker
 
 _FIRST_PRIVATE_OPCODE = 0x80
-"""From here on opcodes belong to others; readers pass over what they do not know."""
+"""First private opcode; readers skip records that they do not know."""
 TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag repair` saves what is sound"
 
 _NOTHING: frozenset[int] = frozenset()
 _INDEXES = frozenset({int(Opcode.MESSAGE_INDEX)})
 _MESSAGES = _INDEXES | {int(Opcode.CHUNK), int(Opcode.MESSAGE)}
-"""Records that may be passed over."""
+"""Records that may be skipped."""
 _END = -1
-"""Stands for the end of the data where an opcode is expected."""
+"""Marks the end of the data in place of an opcode."""
 _Record = TypeVar("_Record")
 
 
 class RawMessage(NamedTuple):
-    """One message as it stands in the file; times in nanoseconds."""
+    """One message as stored in the file; times in nanoseconds."""
 
     channel: Channel
     schema: Schema | None
@@ -55,8 +55,8 @@ class RawMessage(NamedTuple):
 class McapFile:
     """One mcap file with ROS 2 messages, to be read once.
 
-    ``chunks_read``, ``stored_bytes`` and ``unpacked_bytes`` count the chunks read so far and the bytes in them, as they
-    stand in the file and decompressed.
+    ``chunks_read``, ``stored_bytes`` and ``unpacked_bytes`` count the chunks read so far and the bytes in them, as
+    stored and decompressed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -73,14 +73,14 @@ class McapFile:
 
     @property
     def position(self) -> int:
-        """How many bytes of the file are read."""
+        """Number of bytes read so far."""
         return self._stream.position if self._stream is not None else 0
 
     def records(self, *, messages: bool = True) -> Iterator[RawMessage | Attachment | Metadata]:
-        """Return messages (if wanted), attachments and metadata in the order of the file.
+        """Yield messages (unless ``messages`` is FALSE), attachments and metadata in the order of the file.
 
         Raises:
-            BagError: the file is truncated, damaged, beyond the limits or no recording of ROS 2.
+            BagError: the file is truncated, damaged, beyond the limits or not a recording of ROS 2.
         """
         for opcode, content in self._parts(_INDEXES if messages else _MESSAGES):
             if opcode == Opcode.CHUNK:
@@ -94,13 +94,13 @@ class McapFile:
                 yield self._parsed(Metadata.read, content)
 
     def chunks(self, *, indexed: bool = True, room: Room | None = None) -> Iterator[WholeChunk | RawMessage]:
-        """Return the chunks, unpacked, with their indexes (if wanted), and the messages outside of chunks.
+        """Yield the chunks, unpacked, with their indexes (if ``indexed``), and the messages outside of chunks.
 
-        ``room`` gives each chunk the place to which it is unpacked, in the order of the chunks.
-        A chunk is handed out before an error of what follows it is raised. ``chunk_messages`` takes it apart.
+        ``room`` returns the buffer into which each chunk is unpacked, in the order of the chunks.
+        A chunk is yielded before an error in what follows it is raised. ``chunk_messages`` returns its messages.
 
         Raises:
-            BagError: as ``records`` does, but for what is wrong inside a chunk.
+            BagError: as ``records`` does, except for errors inside a chunk.
         """
         pending: WholeChunk | None = None
         parts = self._parts(_NOTHING if indexed else _INDEXES)
@@ -131,10 +131,10 @@ class McapFile:
                 yield self._message(content)
 
     def chunk_messages(self, chunk: WholeChunk) -> Iterator[RawMessage]:
-        """Return the messages of an unpacked chunk, and take over what it defines.
+        """Yield the messages of an unpacked chunk, and add its definitions.
 
         Raises:
-            BagError: it is damaged or beyond the limits.
+            BagError: the chunk is damaged or beyond the limits.
         """
         data, position = bytes(chunk.data), 0
         self._place = chunk.place
@@ -155,7 +155,7 @@ class McapFile:
         self._place = None
 
     def _parts(self, without: frozenset[int]) -> Iterator[tuple[int, bytes]]:
-        """Return opcode and content of each record of the data; checks what stands around them, takes definitions."""
+        """Yield opcode and content of each record of the data; check the parts around the data, add definitions."""
         with opened(self.path) as file:
             self._unpacker = Unpacker(self.path, os.fstat(file.fileno()).st_size)
             self._stream = stream = CheckedStream(file)
@@ -182,7 +182,7 @@ class McapFile:
             self._read_summary(stream)
 
     def _read_summary(self, stream: CheckedStream) -> None:
-        """Read what stands after the data; only its checksum and its end matter here."""
+        """Read the section after the data, and check its checksum and its end."""
         stream.begin_crc()
         opcode, length = self._next_head(stream)
         while opcode != Opcode.FOOTER:
@@ -224,7 +224,7 @@ class McapFile:
         return BagError("AMX6812", self.path, f"ends early, at byte {stream.position}", TRUNCATED_HINT)
 
     def _parsed(self, parse: Callable[[ReadDataStream], _Record], content: bytes) -> _Record:
-        """Let the library parse one record, which cannot read beyond the record's end."""
+        """Parse one record by the package mcap, which cannot read beyond the record's end."""
         try:
             return parse(ReadDataStream(io.BytesIO(content)))
         except (McapError, struct.error, ValueError, OverflowError) as error:
@@ -247,7 +247,7 @@ class McapFile:
             raise self._damaged(f"the checksum of {what} is wrong")
 
     def define(self, opcode: int, content: bytes) -> None:
-        """Take over a schema or channel; files may repeat them, the first one counts.
+        """Add a schema or channel; files may repeat them, the first one counts.
 
         Raises:
             BagError: it is damaged, or all of them together are beyond the limits.

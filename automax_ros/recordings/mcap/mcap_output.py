@@ -43,26 +43,26 @@ _COMPRESSORS: dict[str, Callable[[bytes], bytes]] = {
 
 
 class Output(Protocol):
-    """What takes the bytes of a file."""
+    """Receives the bytes of a file."""
 
     def write(self, data: bytes) -> int:
-        """Append all of the bytes."""
+        """Append all bytes."""
         ...
 
     def tell(self) -> int:
-        """Return how many bytes stand in the file."""
+        """Return the number of bytes in the file."""
         ...
 
 
 class McapOutput:
-    """One mcap file of profile ``ros2``; OSError of the output passes through.
+    """Writes one mcap file of profile ``ros2``; an OSError of the output is not caught.
 
-    Schemas and channels are told twice: to ``schemas`` and ``channels`` for the summary, and as records, in a chunk or
-    by ``add_definition``.
+    The caller adds schemas and channels twice: to ``schemas`` and ``channels`` for the summary, and as records, in a
+    chunk or by ``add_definition``.
     """
 
     def __init__(self, output: Output, *, library: str, compression: str, profile: str = "ros2") -> None:
-        """Write the header. ``compression`` is ``zstd``, ``lz4`` or nothing."""
+        """Write the header. ``compression`` is ``zstd``, ``lz4`` or empty."""
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self._output = output
@@ -113,7 +113,7 @@ class McapOutput:
         MetadataIndex(offset=offset, length=length, name=metadata.name).write(self._metadata_indexes)
 
     def add_chunk(self, chunk: ChunkBuilder) -> None:
-        """Write a chunk with its index; one without messages is left out."""
+        """Write a chunk with its index, unless it has no messages."""
         if not chunk.has_messages:
             return
         data = chunk.data
@@ -129,11 +129,11 @@ class McapOutput:
         self._add(packed, chunk, first_time, last_time)
 
     def add_packed_chunk(self, packed: Chunk, chunk: ChunkBuilder) -> None:
-        """Write a chunk as it is, with the index that ``chunk`` has of it."""
+        """Write a compressed chunk unchanged, with the index in ``chunk``."""
         self._add(packed, chunk, chunk.first_time, chunk.last_time)
 
     def _add(self, packed: Chunk, chunk: ChunkBuilder, first_time: int, last_time: int) -> None:
-        """Write a chunk and its index, whose messages have these log times at most."""
+        """Write a chunk and its index; its messages' log times are from ``first_time`` to ``last_time``."""
         start = self._output.tell()
         record = record_bytes(packed)
         length = len(record)

@@ -19,7 +19,7 @@ _ROOT = "rosbag2_bagfile_information"
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """Writes equal parts in full: readers of bags do not all know YAML's anchors."""
+    """Writes equal parts in full: not all readers of bags know YAML's anchors."""
 
     def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002
         return True
@@ -48,21 +48,21 @@ class FileSummary:
 
 @dataclass(frozen=True)
 class BagMetadata:
-    """What a recording holds: its data files in the order of time, at least one, and its topics."""
+    """The metadata of a recording: its data files in the order of time, at least one, and its topics."""
 
     files: Sequence[FileSummary]
     topics: Sequence[TopicSummary] = ()
     custom_data: Mapping[str, str] = field(default_factory=dict)
 
     def document(self, alone: str | None = None) -> str:
-        """Return what stands in metadata.yaml; ``alone`` is the text of ``information``, if it was made before."""
+        """Return the text of metadata.yaml; ``alone`` is the text of ``information`` if that exists already."""
         if alone is None or any("\n" in text for text in self.custom_data.values()):
             return yaml_text({_ROOT: self.information()})
-        # The same further in: making it again takes longer than a second of a rack.
+        # The same text, indented: generating it again takes longer than a second of a rack.
         return f"{_ROOT}:\n{indent(alone, '  ')}"
 
     def information(self) -> dict[str, Any]:
-        """The fields of ``rosbag2_bagfile_information``, in the order in which rosbag2 writes them."""
+        """Return the fields of ``rosbag2_bagfile_information``, in the order in which rosbag2 writes them."""
         filled = [file for file in self.files if file.message_count] or self.files[:1]
         start = min(file.starting_time for file in filled)
         end = max(file.starting_time + file.duration for file in filled)
@@ -114,6 +114,6 @@ def qos_text(qos: QosProfile) -> str:
 
 
 def yaml_text(data: object) -> str:
-    """Data as YAML in the order given; the same data give the same text."""
+    """Return data as YAML in the order given; the same data give the same text."""
     text: str = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=4096)
     return text

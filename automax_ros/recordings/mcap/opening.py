@@ -1,4 +1,4 @@
-"""Opens the files of recordings: regular files only, so that a pipe in a recording's folder holds nobody up."""
+"""Opens the files of recordings: regular files only, so that a pipe in a recording's folder does not block."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def opened(path: Path) -> Iterator[BufferedReader]:
     """Open a file of a recording for as long as the block lasts.
 
     Raises:
-        BagError: it is not a regular file, cannot be read, or the block runs out of memory for it.
+        BagError: it is not a regular file or cannot be read, or the block runs out of memory.
     """
     try:
         with open_regular(path) as file:
@@ -32,7 +32,7 @@ def opened(path: Path) -> Iterator[BufferedReader]:
 
 
 def no_recording(path: Path) -> BagError:
-    """Return the error that says why nothing can be read at a path that is neither a folder nor a regular file."""
+    """Return the error for a path that is neither a folder nor a regular file."""
     what = "does not exist"
     if path.exists():
         what = "is not a regular file"
@@ -42,7 +42,7 @@ def no_recording(path: Path) -> BagError:
 
 
 def size_of(file: Path) -> int:
-    """Return the size of a file in bytes, at least 1; 1 if the system does not tell."""
+    """Return the size of a file in bytes, at least 1; 1 if it is unknown."""
     try:
         return max(1, file.stat().st_size)
     except OSError:

@@ -1,4 +1,4 @@
-"""Decompresses chunks that nobody has to be trusted with: what they claim to hold is checked before it takes memory."""
+"""Decompresses untrusted chunks: the size that they state is checked before memory is allocated."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from mcap.records import Chunk
 from automax_ros.recordings.mcap.errors import BagError
 
 MAX_RECORD_BYTES = 64 << 20
-"""Longest record, longest decompressed chunk and longest sum of all schemas and channels that is read, in bytes
+"""Longest record, longest decompressed chunk and greatest sum of all schemas and channels that is read, in bytes
 (decision: a bound on memory for untrusted recordings)."""
 MAX_RATIO = 1000
 FREE_BYTES = 512 << 20
-"""A file may unpack to this many times its size and these bytes, not more (decision): recordings come to 10 or 50."""
+"""A file may unpack to ``MAX_RATIO`` times its size plus these bytes (decision): recordings come to 10 or 50 times."""
 DAMAGED_HINT = "copy the file again from where it was recorded, or save what is sound by `automax bag repair`"
 
 Buffer = bytes | memoryview
 Room = Callable[[int], memoryview]
-"""Gives as many bytes to write to."""
+"""Returns a buffer of a given number of bytes."""
 
 
 class Unpacker:
@@ -35,10 +35,10 @@ class Unpacker:
         self._zstd = zstandard.ZstdDecompressor()
 
     def unpacked(self, chunk: Chunk) -> bytes:
-        """Return what a chunk holds.
+        """Return the unpacked bytes of a chunk.
 
         Raises:
-            BagError: damaged, beyond the limits, or of a compression that we do not know; the message names no place.
+            BagError: damaged, beyond the limits, or of an unknown compression; the message names no place.
         """
         self._admit(chunk.uncompressed_size)
         data = self._decompressed(chunk)
@@ -46,7 +46,7 @@ class Unpacker:
         return data
 
     def unpacked_in(self, chunk: Chunk, room: Room) -> memoryview:
-        """Return what a chunk holds, in the room for it, which is asked for when its size is known to be admissible.
+        """Return the unpacked bytes of a chunk, in a buffer from ``room``, which is called after its size was checked.
 
         Raises:
             BagError: as ``unpacked`` does.
@@ -75,7 +75,7 @@ class Unpacker:
             raise self._damaged("the checksum of a chunk is wrong")
 
     def beginning(self, compression: str, data: bytes, size: int) -> bytes:
-        """Return as much of a chunk of ``size`` bytes as the beginning of its compressed data gives.
+        """Return as much of a chunk of ``size`` bytes as can be unpacked from the beginning of its compressed data.
 
         Raises:
             BagError: beyond the limits.
@@ -110,20 +110,20 @@ class Unpacker:
             return unpacked
         if compression != "zstd":
             raise BagError("AMX6811", self._path, f"is compressed with {compression[:40]!r}; zstd and lz4 can be read")
-        # zstandard allocates what the frame states, so that has to be looked at too.
+        # zstandard allocates the size that the frame states, so that must be checked too.
         stated = zstandard.get_frame_parameters(data).content_size
         if stated not in (size, zstandard.CONTENTSIZE_UNKNOWN):
             raise self._damaged(f"a chunk holds {stated} bytes and should hold {size}")
         return self._zstd.decompress(data, max_output_size=size) if size else b""
 
     def _is_in(self, place: memoryview, chunk: Chunk) -> bool:
-        """Decompress a sound zstd frame that states its size into its place; FALSE if it is anything else."""
+        """Decompress a sound zstd frame that states its size into ``place``; return FALSE for anything else."""
         if chunk.compression != "zstd" or not len(place):
             return False
         with contextlib.suppress(zstandard.ZstdError):
             if zstandard.get_frame_parameters(chunk.data).content_size == len(place):
                 with self._zstd.stream_reader(chunk.data) as reader:
-                    # The second read comes to the end of the frame, and to its checksum.
+                    # The second read reaches the end of the frame, and checks its checksum.
                     return reader.readinto(place) == len(place) and not reader.read(1)
         return False
 

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all: written under another name next to their place, renamed at the end."""
+"""Atomic writing of files: under another name in the same folder, renamed at the end."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ _MOST_TRIES = 100
 _LONGEST_SUFFIX = 16
 _PAUSE_S = 0.01
 _MOST_PAUSES = 100
-"""A pipe may be without a reader for a second: whoever is started at the same time gets there (decision)."""
+"""A pipe may be without a reader for a second, for a reader that is started at the same time (decision)."""
 
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """Give the path to write to, in the same folder and with the same suffix; ``path`` is replaced when the block ends.
+    """Yield the path to write to, in the same folder and with the same suffix; it replaces ``path`` after the block.
 
-    If the block ends with an exception the new file is removed, and ``path`` stays as it was. A pipe, /dev/stdout
-    and whatever else is not a regular file is given itself, open until the block ends.
+    If the block ends with an exception the new file is removed, and ``path`` is unchanged. For a pipe, /dev/stdout
+    and anything else that is not a regular file, ``path`` itself is yielded, open until the block ends.
 
     Raises:
-        OSError: the folder or the file there cannot be written, or it is a pipe that nobody reads.
+        OSError: the folder or the file in it cannot be written, or it is a pipe without a reader.
     """
     if is_direct(path):
         with held_open(path):
@@ -47,10 +47,10 @@ def atomic_write(path: Path) -> Iterator[Path]:
 
 
 def open_at_once(path: str | os.PathLike[str], flags: int) -> int:
-    """Open a path for writing, as ``open`` takes it for its ``opener``; never wait for a pipe's reader without end.
+    """Open a path for writing, as an ``opener`` for ``open``, without waiting indefinitely for a pipe's reader.
 
     Raises:
-        OSError: it cannot be opened; a pipe is refused that nobody has begun to read within a second (decision).
+        OSError: it cannot be opened; a pipe is refused if it has no reader within a second (decision).
     """
     for _ in range(_MOST_PAUSES):
         try:
@@ -67,10 +67,10 @@ def open_at_once(path: str | os.PathLike[str], flags: int) -> int:
 
 @contextmanager
 def held_open(path: Path) -> Iterator[None]:
-    """Keep what is not a regular file open while the block runs, so that a pipe's reader sees no end before it.
+    """Keep a pipe or other special file open while the block lasts, so that a pipe's reader sees no end before.
 
     Raises:
-        OSError: it cannot be written, or it is a pipe that nobody reads.
+        OSError: it cannot be written, or it is a pipe without a reader.
     """
     descriptor = open_at_once(path, os.O_WRONLY)
     try:
@@ -80,13 +80,13 @@ def held_open(path: Path) -> Iterator[None]:
 
 
 def is_direct(path: Path) -> bool:
-    """Whether a path has to be written itself; /dev/stdout has to be even where it is redirected to a file."""
+    """Whether a path must be written directly, not replaced; /dev/stdout must be even if redirected to a file."""
     folder = os.path.realpath(path.parent)
     return folder == "/dev" or folder.startswith("/proc/") or (path.exists() and not path.is_file())
 
 
 def _mode_of(target: Path) -> int | None:
-    """Return the permissions of the file that is replaced; one that must not be written is refused."""
+    """Return the permissions of the file to be replaced; refuse one without write permission."""
     try:
         mode = stat.S_IMODE(target.stat().st_mode)
     except FileNotFoundError:

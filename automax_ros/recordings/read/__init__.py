@@ -1,1 +1,1 @@
-"""Recordings read: messages, blocks of messages, the write log, whether they are sound."""
+"""Reading recordings: messages, blocks of messages, the write log, checks of soundness."""

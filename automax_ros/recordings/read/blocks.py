@@ -1,7 +1,7 @@
-"""Reads recordings in blocks of thousands of messages, which then are decoded and taken together.
+"""Reads recordings in blocks of thousands of messages, which are decoded together.
 
-Where a chunk's index does not tell all of its messages, they come one by one; so they do in recordings of others,
-which stand in another order than that of sending.
+The messages of a chunk whose index is incomplete are returned one by one, and so are those of other programs'
+recordings, which are not stored in the order of sending.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from automax_ros.recordings.read.reader import (
 Bytes = NDArray[np.uint8]
 _CHANNELS = 1 << 16
 TableOf = Callable[[Buffer, Sequence[int]], ChunkTable | None]
-"""Finds where the messages of unpacked chunks stand, a chunk up to each end; None where one has to be looked at."""
+"""Returns the table of messages of unpacked chunks, given the end of each; None if one must be read separately."""
 _TWO_NUMBERS = struct.Struct("<HH")
-"""What a schema or channel begins with: its own number, and in a channel that of its schema."""
+"""Beginning of a schema or channel: its own number, and in a channel that of its schema."""
 
 
 @dataclass(frozen=True)
 class MessageBlock:
-    """Messages of one file in the order of sending: where each begins in ``data`` and its bytes, and its times in ns.
+    """Messages of one file in the order of sending: the start of each in ``data``, its length, and its times in ns.
 
-    ``kinds`` are places in the types that were asked for, ``numbers`` those of the channels.
+    ``kinds`` are indices of the requested types, ``numbers`` those of the channels.
     """
 
     source: DataSource
@@ -57,10 +57,10 @@ class MessageBlock:
         return len(self.starts)
 
     def message(self, number: int) -> BagMessage:
-        """Return one message, decoded by itself.
+        """Return one message, decoded alone.
 
         Raises:
-            BagError: it is malformed.
+            BagError: the message is malformed.
         """
         channel = self.source.channels[int(self.numbers[number])]
         start = int(self.starts[number])
@@ -74,9 +74,9 @@ class MessageBlock:
 def message_blocks(
     reader: BagReader, types: Sequence[str], table_of: TableOf | None = None
 ) -> Iterator[MessageBlock | BagMessage]:
-    """Return the messages of these types in the order of sending: in blocks, or one by one.
+    """Yield the messages of these types in the order of sending: in blocks, or one by one.
 
-    ``table_of`` finds the messages of a chunk by itself; without it the chunks' indexes tell.
+    ``table_of`` finds the messages of a chunk; without it the chunks' indexes are used.
 
     Raises:
         BagError: as ``BagReader.messages`` does, at the same message.
@@ -97,7 +97,7 @@ def message_blocks(
 
 
 class _BlockFile:
-    """One file, read in blocks."""
+    """Reads one file in blocks."""
 
     def __init__(
         self, file: McapFile, source: DataSource, types: Sequence[str], order: FileOrder, table_of: TableOf | None
@@ -115,11 +115,11 @@ class _BlockFile:
 
     @property
     def position(self) -> int:
-        """How many bytes of the file are read."""
+        """Number of bytes of the file read so far."""
         return self._file.position
 
     def items(self) -> Iterator[MessageBlock | BagMessage]:
-        """Return what the file holds; what was read before an error is handed out first."""
+        """Yield the messages of the file; those read before an error are yielded first."""
         try:
             for record in self._file.chunks(indexed=self._table_of is None, room=self._buffer.room):
                 if isinstance(record, WholeChunk):
@@ -137,7 +137,7 @@ class _BlockFile:
         yield from self._kept()
 
     def _kept(self) -> Iterator[MessageBlock | BagMessage]:
-        """Return the chunks kept so far, as one block if they are as they should be, and forget them."""
+        """Yield the messages of the chunks kept so far, as one block if possible, and discard the chunks."""
         chunks, self._chunks = self._chunks, []
         whole = self._whole_table(chunks)
         if whole is not None:
@@ -157,7 +157,7 @@ class _BlockFile:
         yield from self._block(tables)
 
     def _whole_table(self, chunks: Sequence[tuple[int, WholeChunk]]) -> ChunkTable | None:
-        """Return where the messages of chunks stand that follow each other; None where each has to be looked at."""
+        """Return the table of all messages of consecutive chunks; None if each chunk must be read separately."""
         if self._table_of is None or not chunks:
             return None
         begin = chunks[0][0]
@@ -165,18 +165,18 @@ class _BlockFile:
         return self._admitted(self._table_of(self._data[begin : begin + ends[-1]].data, ends))
 
     def _table(self, chunk: WholeChunk) -> ChunkTable | None:
-        """Return where the messages of a chunk stand; None where they have to be read one by one."""
+        """Return the table of the messages of a chunk; None if they must be read one by one."""
         table = chunk.table() if self._table_of is None else self._table_of(chunk.data, [len(chunk.data)])
         return self._admitted(table)
 
     def _admitted(self, table: ChunkTable | None) -> ChunkTable | None:
-        """Return a table whose messages can all be read, and take over what it tells; else None."""
+        """Return a table if all its messages can be read, and add its definitions and times; else return None."""
         if table is None or not self._is_defined(table):
             return None
         times = table.log_times
         before = self.last_log
         if (times[1:] <= times[:-1]).any() or (before is not None and int(times[0]) <= before):
-            return None  # read one by one: the messages before the wrong one count
+            return None  # read one by one, so that the messages before the wrong one are returned
         if not self._begun:
             self._order.begin(self._file.path, int(times[0]))
             self._begun = True
@@ -184,7 +184,7 @@ class _BlockFile:
         return table
 
     def _is_defined(self, table: ChunkTable) -> bool:
-        """Take over what a chunk defines; return whether its channels stand before their messages and can be read."""
+        """Add the definitions of a chunk; return whether its channels precede their messages and can be read."""
         if not table.definitions and self._is_known[table.numbers].all():
             return True
         unknown = [
@@ -204,7 +204,7 @@ class _BlockFile:
         return all(self._is_readable(number) for number, _ in unknown)
 
     def _stand_before(self, unknown: list[tuple[int, int]], definitions: Sequence[tuple[int, int, bytes]]) -> bool:
-        """Return whether channels and their schemas are known or stand before the places of the first messages."""
+        """Return whether channels and their schemas are known or precede their first messages."""
         begins: dict[tuple[int, int], int] = {}
         schemas = {number: channel.schema_id for number, channel in self._file.channels.items()}
         for place, opcode, content in definitions:
@@ -225,7 +225,7 @@ class _BlockFile:
         return True
 
     def _is_readable(self, number: int) -> bool:
-        """Make the reader of a channel, if it can be read."""
+        """Create the reader of a channel; return whether it can be read."""
         made = self._source.channels.get(number)
         if made is None:
             channel = self._file.channels[number]
@@ -241,7 +241,7 @@ class _BlockFile:
         return True
 
     def _block(self, tables: Sequence[tuple[int, ChunkTable]]) -> Iterator[MessageBlock]:
-        """Return the chunks whose messages these tables tell as a block."""
+        """Yield the messages of these tables as a block."""
         if not tables:
             return
         starts = _joined([table.starts + begin for begin, table in tables])
@@ -255,7 +255,7 @@ class _BlockFile:
             yield MessageBlock(self._source, self._data, *columns)
 
     def _one_by_one(self, record: WholeChunk | RawMessage) -> Iterator[BagMessage]:
-        """Return messages that stand in no block."""
+        """Yield messages that are not in a block."""
         records = self._file.chunk_messages(record) if isinstance(record, WholeChunk) else iter([record])
         for raw in records:
             if not self._begun:

@@ -1,8 +1,7 @@
-"""The write log of common memory as a recording gives it: one run of one rack, its values in their variables' types.
+"""The write log of common memory in a recording: one run of one rack, its values in their variables' types.
 
-The table of common variables in a recording: which names it has and how the engineer asks for them.
-
-How far the write log of one run is known, by the numbers of its messages; for every reader and recorder of it.
+Also the recording's table of common variables, the choice of variables by name, and the check for missing writes by
+their numbers, which recorders use, too.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _NAME = re.compile(r"[A-Z_][A-Z0-9_]{0,63}[%!@$]?|SLOT:[0-9]{1,2}%")
 
 @dataclass(frozen=True)
 class Watched:
-    """One column of an export: a simple variable, or the element of an array at a flat index; the engineer's unit."""
+    """One column of an export: a simple variable, or the element of an array at a flat index; its engineering unit."""
 
     label: str
     variable: int
@@ -66,7 +65,7 @@ def watched_by_default(variables: dict[str, Variable]) -> list[Watched]:
 
 
 def watched_by_name(variables: dict[str, Variable], names: Sequence[str]) -> list[Watched]:
-    """Return the variables and array elements that were asked for, such as ``REF%`` and ``TABLE%(3)``, each once.
+    """Return the requested variables and array elements, such as ``REF%`` and ``TABLE%(3)``, each once.
 
     Raises:
         NameFault: there is no such variable or element.
@@ -82,16 +81,16 @@ def watched_by_name(variables: dict[str, Variable], names: Sequence[str]) -> lis
 
 
 class WriteLog:
-    """Follows the write log of a run. ``sequence`` is the number of the last write that is known, None before any."""
+    """Follows the write log of a run. ``sequence`` is the number of the last known write, None before the first."""
 
     def __init__(self, run_id: int) -> None:
         self.run_id = run_id
         self.sequence: int | None = None
 
     def missing(self, sequence: int, *, image: bool) -> int:
-        """Return how many writes are missing before a message, negative if all that it tells is known.
+        """Return how many writes are missing before a message, negative if its contents are known already.
 
-        An image contains the write whose number it has, a write comes after the one before it.
+        An image includes the write whose number it has; a write has the number after the previous one.
         """
         if self.sequence is None:
             return 0
@@ -107,16 +106,16 @@ Cell = Value
 
 
 _Kind = tuple[Callable[[float], Value] | None, float, float, int, str]
-"""How the values of a variable are typed, the least and the greatest, how many elements it has, its name."""
+"""A variable's conversion of values, its least and greatest value, its number of elements, its name."""
 _CHANNEL_NUMBERS = 256
 MOST_GAPS = 100
 
 
 class CommonLog:
-    """Takes the messages of the write log of one run; what is of another run, or known already, is passed over.
+    """Reads the messages of the write log of one run; those of another run, or known already, are ignored.
 
-    Writes that are missing are an error here unless an image makes up for them, numbers that a variable cannot have are
-    not: ``_bridge``, ``_odd``. ``missing_writes`` says which writes are missing, the first ``MOST_GAPS`` times.
+    Missing writes are an error here unless an image makes up for them, numbers that a variable cannot have are not;
+    see ``_bridge`` and ``_odd``. ``missing_writes`` lists the first ``MOST_GAPS`` gaps.
 
     Raises:
         BagError: the table of variables is not one that a rack sends.
@@ -138,7 +137,7 @@ class CommonLog:
         self._read_kinds = {**_CHANNELS, **_DRIVES, **self._kinds}
 
     def check_table(self, table: VariableTable) -> None:
-        """Make sure that a further table is of the same run.
+        """Check that a further table is of the same run.
 
         Raises:
             BagError: it is that of another run.
@@ -149,7 +148,7 @@ class CommonLog:
             raise BagError("AMX6822", self._bag, text)
 
     def take(self, message: CommonImage | CommonWrite) -> list[Entry] | None:
-        """Return the entries of a message, None if it tells nothing new.
+        """Return the entries of a message, None if it has nothing new.
 
         Raises:
             BagError: writes before it are missing, or it does not fit the table of variables.
@@ -173,10 +172,10 @@ class CommonLog:
         return self.entries(message.values, message.stamp)
 
     def reads(self, values: Values, stamp: int) -> list[Entry]:
-        """Return what a scan read, as ``entries`` does; what channels or a drive gave has views of its own.
+        """Return the values that a scan read, as ``entries`` does; those of channels and drives have separate views.
 
         Raises:
-            BagError: it does not fit the table of variables.
+            BagError: they do not fit the table of variables.
         """
         return self._typed(values, stamp, self._read_kinds)
 
@@ -213,7 +212,7 @@ class CommonLog:
         return found
 
     def _odd(self, name: str, value: float) -> Value:  # noqa: ARG002
-        """Return a number that the variable cannot have, as it stands; ValueError where that does harm."""
+        """Return a number that the variable cannot have unchanged; subclasses may raise ValueError."""
         return value
 
     def _bridge(self, missing: int, message: CommonImage | CommonWrite) -> None:
@@ -240,7 +239,7 @@ _TYPED: dict[DataType, Callable[[float], Value]] = {
     DataType.REAL: float,
     DataType.BOOLEAN: bool,
 }
-"""What makes a number in a message one of the variable's type; strings have none."""
+"""Conversions of a number in a message to the variable's type; strings have none."""
 _CHANNELS: dict[int, _Kind] = {
     view: (_TYPED.get(kind), *kind.range, _CHANNEL_NUMBERS, "a channel") for kind, view in CHANNEL_VIEWS.items()
 }
@@ -256,7 +255,7 @@ _DRIVES: dict[int, _Kind] = {
 
 
 class WatchedValues:
-    """The watched variables as messages tell them, by the index of their column."""
+    """The values of watched variables from messages, by the index of their column."""
 
     def __init__(self, watched: Sequence[Watched]) -> None:
         self._columns = {(item.variable, item.element): index for index, item in enumerate(watched)}
@@ -264,18 +263,18 @@ class WatchedValues:
         self._told: dict[int, Cell] = {}
 
     def take(self, entries: Iterable[Entry]) -> None:
-        """Take over the values of one message."""
+        """Set the values of one message."""
         for variable, place, value in entries:
             index = self._columns.get((variable, place))
             if index is not None:
                 self._told[index] = value
 
     def tell(self, index: int, value: Cell) -> None:
-        """Take over the value of one column."""
+        """Set the value of one column."""
         self._told[index] = value
 
     def changes(self) -> dict[int, Cell]:
-        """Return what differs from the call before."""
+        """Return the values that differ from those at the previous call."""
         if not self._told:
             return {}
         shown = self._shown
@@ -286,7 +285,7 @@ class WatchedValues:
 
 
 def _missing_text(missing: int, message: CommonImage | CommonWrite) -> str:
-    """Return which writes are missing before a message; an image has the last of them in it."""
+    """Return in words which writes are missing before a message; an image includes the last of them."""
     last = message.sequence - (0 if isinstance(message, CommonImage) else 1)
     first = last - missing + 1
     writes = f"writes {first} to {last} are" if missing > 1 else f"write {last} is"
@@ -294,7 +293,7 @@ def _missing_text(missing: int, message: CommonImage | CommonWrite) -> str:
 
 
 def _run_text(table: VariableTable) -> str:
-    """Return which run a table of variables is of: two racks, or runs of one, may have the same name."""
+    """Return the run of a table of variables in words: two racks, or two runs of one, may have the same name."""
     return f"{table.rack[:40]} (run {table.run_id}, its table at {seconds_text(table.stamp)} s)"
 
 

@@ -1,4 +1,4 @@
-"""What can be played of a recording, ours or another program's: its topics, its span of time, its messages as bytes."""
+"""The playable part of a recording, ours or another program's: its topics, its time span, its messages as bytes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from automax_ros.recordings.read.reader import BagReader
 
 TABLE_TYPE = "automax_msgs/msg/VariableTable"
 MAX_LATCHED_BYTES = 256 << 20
-"""Most bytes of latched messages that playback keeps to send before all others (decision: a bound on memory)."""
+"""Most bytes of latched messages that playback keeps, to send before all others (decision: a bound on memory)."""
 _MAX_TOPICS = 10_000
 _MAX_TOPIC = 247
 _PROGRESS_MASK = 0x3FF
@@ -39,13 +39,13 @@ class PlayTopic:
 
     @property
     def is_latched(self) -> bool:
-        """Whether the last message waits for late joiners."""
+        """Whether the last message is kept for late joiners."""
         return self.qos.durability == "transient_local"
 
 
 @dataclass
 class PlayableRecording:
-    """A recording read once from end to end, so that nothing is wrong with it.
+    """A recording that was read once from end to end without an error.
 
     Times are log times in ns. ``run_start`` is the stamp of the first VariableTable, the time of the first message
     where there is none; ``spaces`` are the namespaces of the racks in it. ``latched`` are the last messages of latched
@@ -63,7 +63,7 @@ class PlayableRecording:
     end: int = 0
 
     def messages(self) -> Iterator[RawMessage]:
-        """Return the messages of the span that can be played, in the order of the files.
+        """Yield the messages of the span that can be played, in the order of the files.
 
         Raises:
             BagError: the recording has changed since and is damaged now.
@@ -83,10 +83,10 @@ def survey(
 ) -> PlayableRecording:
     """Read a recording; ``begin_ns`` and ``end_ns`` count from the start of the run, None for all.
 
-    ``stopping`` is asked now and then; where it is true the survey ends early and is worth nothing.
+    ``stopping`` is called from time to time; if it returns TRUE the survey ends early and its result is unusable.
 
     Raises:
-        BagError: it is none, is damaged, or is empty in the span.
+        BagError: it is not a recording, is damaged, or is empty in the span.
     """
     found = PlayableRecording(BagReader(path))
     found.bag.on_progress = on_progress
@@ -120,7 +120,7 @@ def survey(
 
 
 def _keep_latched(found: PlayableRecording, path: Path, stopping: Callable[[], bool]) -> None:
-    """Keep the last message of each latched topic before the span: late joiners of the run have got it too."""
+    """Keep the last message of each latched topic before the span: late joiners of the run received it, too."""
     size = 0
     for number, record in enumerate(found.bag.records()):
         if not number & _PROGRESS_MASK and stopping():
@@ -136,7 +136,7 @@ def _keep_latched(found: PlayableRecording, path: Path, stopping: Callable[[], b
 
 
 def choose(found: PlayableRecording, patterns: Collection[str]) -> list[str]:
-    """Leave only the topics that a pattern names, such as ``/pm1/common/*``; return patterns that name none."""
+    """Keep only the topics that match a pattern, such as ``/pm1/common/*``; return patterns that match none."""
     unused = [pattern for pattern in patterns if not any(fnmatchcase(name, pattern) for name in found.topics)]
     for name in list(found.topics):
         if not any(fnmatchcase(name, pattern) for pattern in patterns):
@@ -145,14 +145,14 @@ def choose(found: PlayableRecording, patterns: Collection[str]) -> list[str]:
 
 
 NOT_CHOSEN = "not chosen"
-"""The fault of a topic that nobody asked for."""
+"""The fault of a topic that was not requested."""
 
 
 class Renaming:
-    """Puts topics into another namespace: a rack's topics in place of its own, others below it."""
+    """Moves topics to another namespace, which replaces that of a rack; all other topics are placed below it."""
 
     def __init__(self, spaces: Collection[str], target: str | None) -> None:
-        """Take the racks' namespaces and the new one, both with their slash; None leaves all as it is."""
+        """Create a renaming of the racks' namespaces to a new one, both with their slash; None changes nothing."""
         self._spaces, self._target = sorted(spaces, key=len, reverse=True), target
 
     def space(self, space: str) -> str:
@@ -171,7 +171,7 @@ class Renaming:
         return self._target + name
 
     def payload(self, type_name: str, data: bytes) -> bytes:
-        """Return a message as it has to be under the new names: a VariableTable tells topics."""
+        """Return a message adapted to the new names: a VariableTable contains names of topics."""
         if self._target is None or type_name != TABLE_TYPE:
             return data
         table = decode(TABLE_TYPE, data)

@@ -1,9 +1,8 @@
 """Reads recordings: rosbag2 folders with mcap files, and single .mcap files, those of other programs too.
 
-Puts the messages of other recorders into the order in which they were sent.
-
-`ros2 bag record` stores messages topic by topic as it gets round to them, latched ones in the order of discovery. What
-a rack sends comes from one thread, so the times of sending are its order; in our own recordings that is the file's.
+Messages are returned in the order in which they were sent. `ros2 bag record` stores them topic by topic in the order
+in which it reads the topics, latched ones in the order of discovery. A rack sends from one thread, so the times of
+sending give the order; in our own recordings that is the order of the file.
 """
 
 from __future__ import annotations
@@ -29,19 +28,19 @@ from automax_ros.recordings.mcap.metadata import METADATA_FILE
 from automax_ros.recordings.mcap.opening import no_recording, opened, size_of
 
 HOLD_NS = NS_PER_S
-"""A message is waited for until one is read that was sent so much later (decision)."""
+"""A message is held until one is read that was sent this much later (decision)."""
 MOST_HELD = 20_000
 MOST_HELD_BYTES = 64 << 20
-"""What waits at most, in messages and in bytes (decision)."""
+"""Most messages and most bytes that are held (decision)."""
 
 Source = TypeVar("Source")
 
 
 def in_sent_order(records: Iterator[tuple[Source, RawMessage]]) -> Iterator[tuple[Source, RawMessage]]:
-    """Return the messages by their times of sending; those of one time in the order in which they stand.
+    """Yield the messages by their times of sending; those of one time in the order of the file.
 
     Raises:
-        BagError: ``records`` has raised it; everything before has been handed out.
+        BagError: ``records`` has raised it; all messages before have been yielded.
     """
     waiting: list[tuple[int, int, Source, RawMessage]] = []
     held = newest = 0
@@ -55,7 +54,7 @@ def in_sent_order(records: Iterator[tuple[Source, RawMessage]]) -> Iterator[tupl
                 *_, its_source, record = heapq.heappop(waiting)
                 held -= len(record.data)
                 yield its_source, record
-    except BagError as error:  # what was read before the damage is handed out first
+    except BagError as error:  # messages read before the damage are yielded first
         failure = error
     while waiting:
         *_, its_source, record = heapq.heappop(waiting)
@@ -68,7 +67,7 @@ ORDER_HINT = "`automax bag repair` leaves out what does not follow on what stand
 MAX_METADATA_BYTES = 4 << 20
 """Longest metadata.yaml that is read, in bytes (decision: a bound on memory for untrusted recordings)."""
 _MAX_YAML_NODES = 2_000_000
-"""More keys and values than MAX_METADATA_BYTES hold."""
+"""More keys and values than fit in MAX_METADATA_BYTES."""
 _MAX_FILES = 10_000
 _PROGRESS_MASK = 0x3FF
 """Progress is reported once per this many records."""
@@ -77,7 +76,7 @@ _PROGRESS_MASK = 0x3FF
 class BagMessage(NamedTuple):
     """One message of a recording; times in nanoseconds.
 
-    ``stamp`` is the time at which it was sent, ``log_time`` that of the log, which is unique in our own recordings.
+    ``stamp`` is the time of sending, ``log_time`` that of the log, which is unique in our own recordings.
     """
 
     topic: str
@@ -90,10 +89,10 @@ class BagMessage(NamedTuple):
 class BagReader:
     """A recording: a rosbag2 folder or one .mcap file. It may be read any number of times, always as a stream.
 
-    ``on_progress``, if set, is called now and then while messages are read, with the share of all bytes that is read by
-    then (0 to 1).
-    ``order`` follows the files' times while messages are read; a part of a recording goes on with that of another.
-    ``last_stamp`` is the stamp of the message read last, be it wanted or not; None before the first.
+    ``on_progress``, if set, is called from time to time while messages are read, with the share of all bytes that has
+    been read (0 to 1).
+    ``order`` checks the files' times while messages are read; a part of a recording continues that of the part before.
+    ``last_stamp`` is the stamp of the message read last, returned or not; None before the first.
 
     Raises:
         BagError: there is no recording at the path, or its metadata.yaml cannot be used.
@@ -117,7 +116,7 @@ class BagReader:
     def part(self, first: int, end: int, after: BagReader | None = None) -> BagReader:
         """Return a reader of the files from number ``first`` to before ``end``, counted from 0.
 
-        ``after`` has read the files before: the order in time is checked over both.
+        ``after`` is a reader that has read the files before: the order in time is checked over both.
         """
         other = self.again()
         other.files = self.files[first:end]
@@ -125,36 +124,35 @@ class BagReader:
         return other
 
     def again(self) -> BagReader:
-        """Return a reader of the same recording that tells nobody of its progress."""
+        """Return a reader of the same recording that does not report its progress."""
         other = copy.copy(self)
         other.on_progress = other.last_stamp = other.order = other._after = None
         return other
 
     @cached_property
     def custom_data(self) -> dict[str, str]:
-        """What the recorder wrote into metadata.yaml, or for a single file into its copy there; empty without one."""
+        """The recorder's custom data in metadata.yaml, or in the copy of it in a single file; empty without any."""
         information = self._information
         if information is None:
             try:
                 information = next(filter(None, map(told_information, self.metadata_records())), {})
-            except BagError:  # whoever reads the messages is told
+            except BagError:  # raised again when the messages are read
                 information = {}
         return custom_data_of(information)
 
     @cached_property
     def is_ours(self) -> bool:
-        """Whether a recorder of ours made it: then the order of the file is the order of sending."""
+        """Whether our recorder made the recording: then the order of the file is the order of sending."""
         return "version" in self.custom_data
 
     def messages(
         self, *, topics: Collection[str] | None = None, types: Collection[str] | None = None
     ) -> Iterator[BagMessage]:
-        """Return the decoded messages in the order of sending, of all topics and types or only of those given.
+        """Yield the decoded messages in the order of sending, of all topics and types or only of those given.
 
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits, its files do not follow each other in
-                time, or it holds a wanted message of a type that we do not know or that was recorded with another
-                definition.
+                time, or a message to be returned has an unknown type or one that was recorded with another definition.
         """
         records = self._sourced()
         for source, record in records if self.is_ours else in_sent_order(records):
@@ -164,7 +162,7 @@ class BagReader:
                 yield channel.decoded(record)
 
     def records(self) -> Iterator[RawMessage]:
-        """Return the messages as they stand in the files.
+        """Yield the messages as stored in the files.
 
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits, or its files overlap in time.
@@ -173,7 +171,7 @@ class BagReader:
             yield record
 
     def _sourced(self) -> Iterator[tuple[DataSource, RawMessage]]:
-        """The messages as they stand in the files, each with its file."""
+        """Yield the messages as stored in the files, each with its file."""
         total = sum(size_of(file) for file in self.files)
         before = 0
         order = self.new_order()
@@ -196,12 +194,12 @@ class BagReader:
             order.end(last_log)
 
     def new_order(self) -> FileOrder:
-        """Begin with what checks that the files follow each other in time, and on those before them; return it."""
+        """Return a new ``order``, which continues that of the files before if there are any."""
         self.order = copy.copy(self._after) or FileOrder(0 if self.is_ours else HOLD_NS)
         return self.order
 
     def attachments(self) -> Iterator[Attachment]:
-        """Return the files stored in the recording; messages are not unpacked.
+        """Yield the files stored in the recording; messages are not unpacked.
 
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits.
@@ -212,7 +210,7 @@ class BagReader:
                     yield record
 
     def metadata_records(self) -> Iterator[Metadata]:
-        """Return the metadata records of the mcap files.
+        """Yield the metadata records of the mcap files.
 
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits.
@@ -224,7 +222,7 @@ class BagReader:
 
 
 def goes_backwards(file: Path, log_time: int, before: int) -> BagError:
-    """Return the error of a message of one of our recordings that is not later than the one before it."""
+    """Return the error for a message of a recording of ours that is not later than the previous one."""
     if log_time == before:
         text = f"two messages have the log time {log_time} ns; in a recording of ours each has its own"
     else:
@@ -233,19 +231,19 @@ def goes_backwards(file: Path, log_time: int, before: int) -> BagError:
 
 
 class FileOrder:
-    """Checks that the files of a recording follow each other in time: only then they can be read as one stream."""
+    """Checks that the files of a recording follow each other in time, as they must to be read as one stream."""
 
     def __init__(self, slack_ns: int) -> None:
-        """Let a file begin by ``slack_ns`` before the end of the one before it."""
+        """Create the check; a file may begin ``slack_ns`` before the end of the previous one."""
         self._slack_ns = slack_ns
         self._name = ""
         self._first = self._last = 0
 
     def begin(self, file: Path, log_time: int) -> None:
-        """Take the log time of a file's first message.
+        """Set the log time of a file's first message.
 
         Raises:
-            BagError: the file before ends later.
+            BagError: the previous file ends later.
         """
         if self._name and log_time < self._last - self._slack_ns + (not self._slack_ns):
             if log_time < self._first:
@@ -258,13 +256,13 @@ class FileOrder:
         self._name, self._first = printable(file.name[:80]), log_time
 
     def end(self, log_time: int | None) -> None:
-        """Take the log time of the last message of that file; None where it holds none."""
+        """Set the log time of the last message of that file; None if it has none."""
         if log_time is not None:
             self._last = log_time
 
 
 class DataSource:
-    """One file of a recording, with the readers of its channels by their numbers."""
+    """One file of a recording, with the readers of its channels by channel number."""
 
     __slots__ = ("channels", "path")
 
@@ -275,10 +273,10 @@ class DataSource:
     def channel(
         self, record: RawMessage, types: Collection[str] | None, topics: Collection[str] | None = None
     ) -> ChannelReader:
-        """Return the reader of a message's channel; it is made at the channel's first message.
+        """Return the reader of a message's channel; it is created at the channel's first message.
 
         Raises:
-            BagError: messages of the type are wanted and cannot be read.
+            BagError: messages of the channel are requested and cannot be read.
         """
         channel = self.channels.get(record.channel.id)
         if channel is None:
@@ -302,19 +300,19 @@ class ChannelReader:
             self._decode = decoder(self.type_name)
 
     def decoded(self, record: RawMessage) -> BagMessage:
-        """Return a record of this channel with its message.
+        """Return a record of this channel with its decoded message.
 
         Raises:
-            BagError: it is malformed.
+            BagError: the message is malformed.
         """
         message = self.message(record.data, record.log_time)
         return BagMessage(self.topic, self.type_name, record.publish_time, record.log_time, message)
 
     def message(self, payload: bytes, log_time: int) -> Message:
-        """Return a message of this channel.
+        """Return a decoded message of this channel.
 
         Raises:
-            BagError: it is malformed.
+            BagError: the message is malformed.
         """
         assert self._decode is not None
         try:
@@ -346,7 +344,7 @@ def read_information(folder: Path) -> dict[str, Any]:
     """Return the content of a folder's metadata.yaml, checked as far as it is used; all scalars are strings.
 
     Raises:
-        BagError: it is not there, cannot be read, or describes no mcap files.
+        BagError: it does not exist, cannot be read, or describes no mcap files.
     """
     path = folder / METADATA_FILE
     if not path.exists():
@@ -371,7 +369,7 @@ def read_information(folder: Path) -> dict[str, Any]:
 
 
 def told_information(record: Metadata) -> dict[str, Any] | None:
-    """Return the copy of metadata.yaml that a data file holds of itself; None if the record is another one or bad."""
+    """Return a data file's copy of metadata.yaml; None if the record is another one or cannot be read."""
     text = record.metadata.get("serialized_metadata", "") if record.name == "rosbag2" else ""
     if not text or len(text) > MAX_METADATA_BYTES:
         return None
@@ -383,7 +381,7 @@ def told_information(record: Metadata) -> dict[str, Any] | None:
 
 
 def custom_data_of(information: Mapping[str, Any]) -> dict[str, str]:
-    """Return the custom data in what metadata.yaml tells."""
+    """Return the custom data in the content of metadata.yaml."""
     custom = information.get("custom_data")
     return {str(key): str(value) for key, value in custom.items()} if isinstance(custom, dict) else {}
 
@@ -392,7 +390,7 @@ def load_yaml(path: object, text: bytes) -> Any:
     """Load YAML without aliases and of bounded depth, which keeps the loader's effort and stack in bounds.
 
     Raises:
-        BagError: it is not YAML of that kind; ``path`` names it.
+        BagError: it is not such YAML; ``path`` is named in the error.
     """
     try:
         return read_data(text.decode(), nodes=_MAX_YAML_NODES)
@@ -404,7 +402,7 @@ def load_yaml(path: object, text: bytes) -> Any:
 
 
 def _data_files(folder: Path, information: dict[str, Any]) -> list[Path]:
-    """The mcap files of a folder; a name that leads out of it is refused."""
+    """Return the mcap files of a folder; refuse a name that leads out of it."""
     names = information.get("relative_file_paths")
     if not isinstance(names, list) or not 0 < len(names) <= _MAX_FILES:
         raise BagError("AMX6813", folder / METADATA_FILE, "names no data files (relative_file_paths)")

@@ -1,4 +1,4 @@
-"""What has to be known of a recorded run before its messages can be understood, wherever in the recording it stands."""
+"""Facts of a recorded run that are needed to read its messages, wherever in the recording they are."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ _HINT = "record the topics /<rack>/variables, /<rack>/backplane and /<rack>/back
 class RunFacts:
     """The first table of variables and the rack's namespace (with its slash); times of the run count from its stamp.
 
-    ``first_write`` is the number of the first write of the run that another program's recorder has got: an image older
-    than the write before it does not tell what memory was then. 0 for recordings of ours: their image is not older.
+    ``first_write`` is the number of the first write of the run that another program's recorder received: an image
+    older than the write before it does not show the memory at that time. 0 for recordings of ours: their image is not
+    older.
     """
 
     table: VariableTable
@@ -28,10 +29,10 @@ class RunFacts:
 
 
 def run_facts(bag: BagReader) -> RunFacts:
-    """Look for what a run is described by.
+    """Find the facts of a run in a recording.
 
     Raises:
-        BagError: there is no table of variables, or the recording cannot be read so far.
+        BagError: there is no table of variables, or the recording cannot be read as far as that.
     """
     reader = bag.again()
     found: RunFacts | None = None
@@ -51,12 +52,12 @@ def run_facts(bag: BagReader) -> RunFacts:
 
 
 def sent_files(bag: BagReader) -> list[RackFile]:
-    """Return the rack's file and its tasks' sources as the rack itself has sent them, nothing where it has not.
+    """Return the rack's file and its tasks' sources as the rack itself sent them, nothing if it did not.
 
-    After a reload it has sent them again: then a name comes with several texts, the first one first.
+    After a reload they are sent again: then a name has several texts, in this order.
 
     Raises:
-        BagError: the message is not one that a rack sends, or the recording cannot be read so far.
+        BagError: the message is not one that a rack sends, or the recording cannot be read as far as that.
     """
     try:
         space = run_facts(bag).space
@@ -79,6 +80,6 @@ def sent_files(bag: BagReader) -> list[RackFile]:
 _NO_TABLE = "AMX6820"
 _STRING = "std_msgs/msg/String"
 _MOST_FILES = 1000
-"""Most files that are taken from the messages of a recording."""
+"""Most files that are read from the messages of a recording."""
 _MOST_RUNS = 1000
-"""Most runs whose first write is remembered until the table says which of them it is."""
+"""Most runs whose first write is remembered until the table identifies the run."""

@@ -1,8 +1,8 @@
-"""Whether a recording is sound: the one answer that `bag info --check`, `bag repair` and `replay` give.
+"""The check of whether a recording is sound, shared by `bag info --check`, `bag repair` and `replay`.
 
-Readers refuse by themselves what is damaged, malformed or out of order (``BagReader``, ``CommonLog``); here all
-messages are read once, and it is told what a recording of ours lacks of a rack. Missing writes that an image makes up
-for do not make it unsound: a replay goes on after them, and they are told.
+Readers themselves refuse damaged or malformed messages and those out of order (``BagReader``, ``CommonLog``); here all
+messages are read once, and a recording of ours is checked for what a rack's recording must have. Missing writes for
+which an image makes up do not make it unsound: a replay continues after them, and they are reported.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from automax_ros.recordings.read.run_facts import run_facts
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a look at a whole recording came to.
+    """The result of checking a whole recording.
 
-    ``fault`` is why it is not sound, None where it is; ``gaps`` says which writes are missing all the same.
+    ``fault`` is why it is not sound, None if it is; ``gaps`` lists writes that are missing nevertheless.
     """
 
     fault: BagError | None = None
@@ -32,7 +32,7 @@ class Verdict:
 
 
 def verdict_of(reader: BagReader) -> Verdict:
-    """Read all messages of the types that are known here."""
+    """Read all messages of the known types, and return the verdict."""
     log: CommonLog | None = None
     fault: BagError | None = None
     scans = _Scans()
@@ -70,30 +70,30 @@ def _log_of(reader: BagReader) -> CommonLog:
 
 
 class _Scans:
-    """Whether any scan can be executed again: it is a task's first, or follows a state of its task."""
+    """Checks whether any scan can be executed again: one that is a task's first, or follows a state of its task."""
 
     def __init__(self) -> None:
         self._states: dict[str, int] = {}
         self._can_begin = False
 
     def take(self, message: Scan | TaskState) -> None:
-        """Take the next scan or state of a task."""
+        """Add the next scan or state of a task."""
         if isinstance(message, TaskState):
             self._states[message.task] = message.scan
         elif not message.scan or self._states.get(message.task) == message.scan - 1:
             self._can_begin = True
 
     def require(self, bag: Path) -> None:
-        """Refuse a recording of which no scan can be executed."""
+        """Refuse a recording of which no scan can be executed again."""
         if not self._can_begin:
             raise BagError("AMX6832", bag, "no scan of any task can be executed again", "see `automax bag info`")
 
 
 def require_tasks(bag: Path, table: VariableTable) -> None:
-    """Refuse the recording of a rack that has no task: nothing of it can be executed again.
+    """Refuse the recording of a rack without tasks: nothing of it can be executed again.
 
     Raises:
-        BagError: it has none.
+        BagError: the rack has no tasks.
     """
     if not any(writer.kind == WriterKind.TASK for writer in table.writers):
         text = "the recorded rack has no tasks, so no scan can be executed again"

@@ -1,4 +1,4 @@
-"""From when to when a recording lasts, read without decoding its messages."""
+"""The time span of a recording, read without decoding its messages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SCAN = "automax_msgs/msg/Scan"
 class Span:
     """Start of the run, first and last stamp; nanoseconds.
 
-    ``scans`` counts those of the tasks asked for that lie in the range asked for.
+    ``scans`` counts those of the requested tasks in the requested range.
     """
 
     run_start: int
@@ -29,7 +29,7 @@ class Span:
     scans: int = 0
 
     def text(self) -> str:
-        """Say from when to when the recording lasts, in s of the run."""
+        """Return the span in words, in s of the run."""
         first, last = (seconds_text(max(0, stamp - self.run_start)) for stamp in (self.first, self.last))
         return f"it lasts from {first} to {last} s of the run"
 
@@ -42,7 +42,7 @@ def span_of(
     to_ns: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Span:
-    """Return how long a recording lasts, and the scans of tasks in a range of ns since the start of the run.
+    """Return the span of a recording, with the number of scans of tasks in a range of ns since the start of the run.
 
     Raises:
         BagError: the recording cannot be read.
@@ -62,7 +62,7 @@ def span_of(
 
 
 def require_scans(bag: Path, run_start: int, tasks: Collection[str], from_ns: int, to_ns: int | None) -> None:
-    """Refuse a range, in ns since the start of the run, in which a recording holds no scan of the tasks.
+    """Refuse a range, in ns since the start of the run, in which a recording has no scan of the tasks.
 
     Raises:
         BagError: there is none, or the recording cannot be read.
@@ -76,5 +76,5 @@ def require_scans(bag: Path, run_start: int, tasks: Collection[str], from_ns: in
 def _task(record: RawMessage) -> str:
     try:
         return scan_head(record.data).task
-    except CdrError:  # whoever decodes it tells
+    except CdrError:  # reported where the message is decoded
         return ""

@@ -1,1 +1,1 @@
-"""Recordings that were cut or damaged: what is sound is saved."""
+"""Repair of cut or damaged recordings: what is sound is saved."""

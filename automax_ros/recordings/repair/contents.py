@@ -1,6 +1,6 @@
-"""What one data file of a recording holds, counted message by message, for its description.
+"""Contents of a recording's data files, for its repair: message counts, the order of messages, and provenance.
 
-Where a recording comes from, found again in its files when metadata.yaml is lost.
+The provenance is found in the data files if metadata.yaml is lost.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MAX_BYTES = 16 << 20
 
 
 class Provenance:
-    """Takes what the files of a recording tell of it, and answers with ``custom_data`` for metadata.yaml."""
+    """Collects provenance from the files of a recording, and returns it as ``custom_data`` for metadata.yaml."""
 
     def __init__(self) -> None:
         self._told: dict[str, str] = {}
@@ -34,7 +34,7 @@ class Provenance:
         self._bytes = 0
 
     def take(self, record: Attachment | Metadata) -> None:
-        """Look at an attachment or metadata record of a data file."""
+        """Read an attachment or metadata record of a data file."""
         if isinstance(record, Metadata):
             information = None if self._told else told_information(record)
             if information is not None:
@@ -45,11 +45,11 @@ class Provenance:
                 self._files[record.name] = RackFile(record.name, record.data.decode("utf-8", "replace"))
 
     def take_information(self, information: Mapping[str, Any]) -> None:
-        """Look at a readable metadata.yaml, or its copy in a data file."""
+        """Read the contents of a readable metadata.yaml, or of its copy in a data file."""
         self._told = custom_data_of(information) or self._told
 
     def custom_data(self, rack: str) -> dict[str, str]:
-        """Return what was told, or what can be found out of the files and the rack's name."""
+        """Return the custom data that were read, else those that follow from the files and the rack's name."""
         if self._told or not rack:
             return dict(self._told)
         return {"rack": rack, "fingerprint": f"{fingerprint(list(self._files.values())):016x}"}
@@ -62,15 +62,15 @@ _MOST_RUNS = 1000
 
 
 class FileSequence:
-    """What each message of one of our recordings has to follow: log times and the numbers of writes increase."""
+    """Checks the order of messages in a recording of ours: log times and numbers of writes increase."""
 
     def __init__(self) -> None:
-        """Nothing has come."""
+        """Create the check, before the first message."""
         self._last_log = -1
         self._writes: dict[int, int] = {}
 
     def fault(self, log_time: int, type_name: str, payload: bytes) -> str:
-        """Return why a message does not follow those before it; empty where it does, and the next follows it."""
+        """Return why a message does not follow those before it; empty if it does, and then the next must follow it."""
         if log_time <= self._last_log:
             return "log times that go backwards" if log_time < self._last_log else "log times that stand twice"
         if type_name == WRITE:
@@ -86,7 +86,7 @@ class FileSequence:
 
 @dataclass
 class FileContents:
-    """Counts of one file; times in nanoseconds, ``stamp`` is a message's own, ``log`` that of the log."""
+    """Counts of one file; times in nanoseconds, ``stamp`` is a message's own time, ``log`` its log time."""
 
     name: str
     messages: int = 0
@@ -96,7 +96,7 @@ class FileContents:
     first_stamp: int = 0
     last_stamp: int = 0
     run_start: int | None = None
-    """The stamp inside the first VariableTable: when the run began."""
+    """The stamp in the first VariableTable: the start of the run."""
     rack: str = ""
     counts: dict[int, int] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
@@ -104,13 +104,13 @@ class FileContents:
     _decoders: dict[int, Callable[[bytes], object] | None] = field(default_factory=dict)
 
     def type_of(self, channel: int) -> str:
-        """Return the name of a channel's messages, empty if nothing is known of them."""
+        """Return the type name of a channel's messages, empty if it is unknown."""
         known = self.channels.get(channel)
         schema = self.schemas.get(known.schema_id) if known else None
         return schema.name if schema else ""
 
     def fault(self, channel: int, payload: bytes) -> str:
-        """Return why a message is malformed; empty where it is not, or its type is not known here."""
+        """Return why a message is malformed; empty if it is not, or if its type is unknown here."""
         if channel not in self._decoders:
             known = self.channels.get(channel)
             schema = self.schemas.get(known.schema_id) if known and known.message_encoding == "cdr" else None
@@ -120,7 +120,7 @@ class FileContents:
             if decode_message is not None:
                 decode_message(payload)
             elif self.type_of(channel) == SCAN:
-                scan_head(payload)  # whatever its definition says, nobody reads it otherwise
+                scan_head(payload)  # readers parse it so, whatever its definition says
         except CdrError as error:
             return str(error)
         return ""
@@ -148,7 +148,7 @@ class FileContents:
 
 
 def topics_of(files: Sequence[FileContents]) -> list[TopicSummary]:
-    """Return the topics of a recording's files, each with the messages of all of them."""
+    """Return the topics of a recording's files, each with its number of messages in all files."""
     found: dict[str, TopicSummary] = {}
     for file in files:
         for number, channel in file.channels.items():
@@ -166,7 +166,7 @@ def topics_of(files: Sequence[FileContents]) -> list[TopicSummary]:
 
 @functools.lru_cache(maxsize=64)
 def _qos(text: str) -> list[dict[str, object]]:
-    """Return the profiles that a channel tells in YAML; what is not of their form is left out."""
+    """Return the QoS profiles in a channel's YAML text, without those of another form."""
     profiles: Any = None
     if len(text) <= _MAX_QOS_TEXT:
         with contextlib.suppress(YamlFault):

@@ -1,8 +1,8 @@
-"""Repairs recordings: whose writer was killed, whose disk was full, that were cut or damaged.
+"""Repairs recordings whose writer was killed, whose disk was full, or which were cut or damaged.
 
-The original is never changed. Sound files are copied byte for byte; of the others everything sound goes into a new file
-with index and summary. After the last whole chunk only whole instants count: a scan without the writes that it made
-would not be what the rack has done.
+The original is never changed. Sound files are copied byte for byte; of the others everything sound is written to a new
+file with index and summary. After the last whole chunk only whole instants are kept: a scan without its writes would
+not show what the rack did.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ MAX_FILES = 10_000
 _NUMBERED = re.compile(r"(.*?)_?(\d{1,9})\.mcap")
 _MISSING_TOLD = 20
 _GAP_NS = NS_PER_S
-"""Files of one recording follow each other within less than this; more is told."""
+"""Longest time between two files of one recording; a longer one is reported as a gap."""
 
 
 @dataclass
 class FileReport:
-    """What became of one data file; counts are those of the repaired file."""
+    """The result for one data file; counts are those of the repaired file."""
 
     name: str
     size: int
@@ -47,27 +47,27 @@ class FileReport:
     dropped_messages: int = 0
     dropped_scans: int = 0
     error: BagError | None = None
-    """Why nothing of it could be read."""
+    """Why nothing in the file could be read."""
     before: FileSequence | None = None
-    """What its messages have to follow; None where they may have any order."""
+    """The check of order before this file's messages; None if they may have any order."""
 
     @property
     def usable(self) -> bool:
-        """Whether there is anything in it for the repaired recording."""
+        """Whether the file contributes anything to the repaired recording."""
         return self.contents.messages > 0 or self.sound
 
 
 @dataclass
 class RepairReport:
-    """What was found and done; ``output`` is None where nothing was written. Times in ns."""
+    """The result of a repair; ``output`` is None where nothing was written. Times in ns."""
 
     bag: Path
     files: list[FileReport] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
-    """What is wrong with the recording as a whole."""
+    """Problems of the recording as a whole."""
     output: Path | None = None
     left: BagError | None = None
-    """Why it is not sound all the same, which no repair mends: what `bag info --check` says of it."""
+    """Why the result is still not sound, for a reason that no repair corrects: the fault in `bag info --check`."""
 
     @property
     def sound(self) -> bool:
@@ -81,7 +81,7 @@ class RepairReport:
 
     @property
     def run_start(self) -> int:
-        """The stamp of the start of the run, or of the first message if no VariableTable tells."""
+        """The stamp of the start of the run, or of the first message without a VariableTable."""
         filled = [file.contents for file in self.files if file.contents.messages]
         told = [item.run_start for item in filled if item.run_start is not None]
         return told[0] if told else min((item.first_stamp for item in filled), default=0)
@@ -90,12 +90,12 @@ class RepairReport:
 def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float], None] | None = None) -> RepairReport:
     """Check a recording, a folder or one .mcap file, and write a repaired one unless it is sound.
 
-    ``output`` is the folder to write, ``<BAG>_repaired`` by default; with one, a sound recording is copied. The default
-    for one file of a recording's folder lies next to that folder.
+    ``output`` is the folder to write, ``<BAG>_repaired`` by default; if it is given, a sound recording is copied. The
+    default for one file of a recording's folder is next to that folder.
 
     Raises:
         BagError: there is no recording, or nothing in it can be used.
-        RecordingError: the output exists already, lies inside the recording's folder, or cannot be written.
+        RecordingError: the output exists already, is inside the recording's folder, or cannot be written.
     """
     tell = on_progress or _tell_nobody
     target = output if output is not None else _default_output(bag)
@@ -123,7 +123,7 @@ def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float],
 
 
 def _tell_nobody(share: float) -> None:
-    """Take the progress where nobody wants it."""
+    """Ignore the progress."""
 
 
 def _default_output(bag: Path) -> Path:
@@ -140,12 +140,12 @@ def _beside(folder: Path, what: str) -> Path:
 
 
 def _is_in_recording(file: Path) -> bool:
-    """Whether a data file lies in the folder of a recording."""
+    """Whether a data file is in the folder of a recording."""
     return (file.parent / METADATA_FILE).exists()
 
 
 def _require_outside(bag: Path, target: Path) -> None:
-    """Refuse to write into the folder of the recording."""
+    """Refuse an output inside the folder of the recording."""
     folder = bag if bag.is_dir() else bag.parent if _is_in_recording(bag) else None
     if folder is not None and folder.resolve() in target.resolve().parents:
         raise RecordingError(
@@ -157,7 +157,7 @@ def _require_outside(bag: Path, target: Path) -> None:
 
 
 def _data_files(bag: Path, report: RepairReport) -> list[Path]:
-    """Return the data files in their order; tell which are missing."""
+    """Return the data files in their order; report those that are missing."""
     if bag.is_file():
         return [bag]
     if not bag.is_dir():
@@ -178,7 +178,7 @@ def _data_files(bag: Path, report: RepairReport) -> list[Path]:
 
 
 def _numbered(found: list[Path]) -> list[str]:
-    """Return the names that files of one recording would have that were all there, up to the last one."""
+    """Return the names that are missing in the numbering of a recording's files, up to the last one found."""
     stem, last, _ = _place(found[-1])
     numbers = {_place(path)[1] for path in found if _place(path)[0] == stem}
     if last < 0 or last >= MAX_FILES or len(numbers) < len(found):
@@ -188,18 +188,18 @@ def _numbered(found: list[Path]) -> list[str]:
 
 
 def _place(path: Path) -> tuple[str, int, str]:
-    """Return the order of a data file: those of one name by their number."""
+    """Return the sort key of a data file: files of one name are sorted by number."""
     match = _NUMBERED.fullmatch(path.name)
     return (match[1], int(match[2]), path.name) if match else (path.name, -1, path.name)
 
 
 def _is_ours(bag: Path, paths: list[Path]) -> bool:
-    """Whether a recorder of ours made it, so that messages follow each other (``BagReader.is_ours``)."""
+    """Whether our recorder made the recording, so that messages follow each other (``BagReader.is_ours``)."""
     for path in (bag, *paths):
         try:
             if BagReader(path).is_ours:
                 return True
-        except BagError:  # whoever reads it is told
+        except BagError:  # raised again when the file is read
             continue
     return False
 
@@ -213,7 +213,7 @@ def _first_log(path: Path) -> int:
 
 
 def _examined(path: Path, provenance: Provenance, sequence: FileSequence | None) -> FileReport:
-    """Read a file to its end; a damaged one is looked at again piece by piece."""
+    """Read a file to its end and report its damage; a damaged one is rewritten later."""
     file = McapFile(path)
     contents = FileContents(path.name, channels=file.channels, schemas=file.schemas)
     before = copy.deepcopy(sequence)
@@ -254,7 +254,7 @@ def _size(path: Path) -> int:
 
 
 def _check_metadata(bag: Path, report: RepairReport, provenance: Provenance) -> None:
-    """Compare metadata.yaml with what the files hold."""
+    """Compare metadata.yaml with the contents of the files."""
     if not bag.is_dir():
         return
     try:
@@ -265,7 +265,7 @@ def _check_metadata(bag: Path, report: RepairReport, provenance: Provenance) -> 
         return
     provenance.take_information(information)
     listed = information.get("relative_file_paths")
-    assert isinstance(listed, list)  # the reader has looked at it
+    assert isinstance(listed, list)  # checked by the reader
     if sorted(listed) != sorted(file.name for file in report.files):
         report.problems.append(f"{METADATA_FILE} names other data files than there are")
     elif listed != [file.name for file in _in_time(report.files)] and all(file.sound for file in report.files):
@@ -285,7 +285,7 @@ def _in_time(files: list[FileReport]) -> list[FileReport]:
 
 
 def _check_gaps(report: RepairReport) -> None:
-    """Report times between two files from which there is nothing."""
+    """Report gaps in time between two files."""
     filled = [file.contents for file in _in_time(report.files) if file.contents.messages]
     for before, after in pairwise(filled):
         gap = after.first_log - before.last_log
@@ -296,7 +296,7 @@ def _check_gaps(report: RepairReport) -> None:
 def _write(
     target: Path, paths: list[Path], report: RepairReport, provenance: Provenance, tell: Callable[[float], None]
 ) -> None:
-    """Write the repaired recording; take it away again if that fails."""
+    """Write the repaired recording; remove it if that fails."""
     try:
         target.mkdir(parents=True)
     except FileExistsError:
@@ -328,7 +328,7 @@ def _write(
 
 
 def _save(path: Path, target: Path, file: FileReport, provenance: Provenance) -> None:
-    """Write what is sound in a file; one with nothing in it is left out."""
+    """Write the sound parts of a file; a file without any is left out."""
     try:
         _rewrite(path, target, file, provenance)
     except BagError as error:
@@ -338,7 +338,7 @@ def _save(path: Path, target: Path, file: FileReport, provenance: Provenance) ->
 
 
 def _nothing(report: RepairReport) -> BagError:
-    """Return why nothing of a recording can be used."""
+    """Return the error for a recording of which nothing can be used."""
     errors = [file.error for file in report.files if file.error is not None]
     if len(report.files) == len(errors) == 1:
         return errors[0]

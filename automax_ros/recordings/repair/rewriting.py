@@ -1,4 +1,4 @@
-"""Writes what is sound in a damaged mcap file as a new file, whole chunks as they are, with index and summary."""
+"""Writes the sound parts of a damaged mcap file to a new file: whole chunks unchanged, with index and summary."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from automax_ros.recordings.repair.salvage import DamagedFileReader, SoundChunk,
 from automax_ros.recordings.write.data_file import DataFile
 
 _LOOSE_BYTES = 1 << 20
-"""Messages that stood outside of chunks are gathered in chunks of this size."""
+"""Size of the chunks in which messages from outside of chunks are collected."""
 _OWN = "automax_msgs/msg/"
 
 
@@ -37,7 +37,7 @@ class Found(NamedTuple):
 
 
 class Definitions:
-    """The schemas and channels that stand anywhere in a file; the first of a number counts."""
+    """The schemas and channels from anywhere in a file; of those with the same number, the first."""
 
     def __init__(self, path: Path) -> None:
         """Read the whole file.
@@ -61,7 +61,7 @@ class Definitions:
         self.compression = compressions.pop() if len(compressions) == 1 else "zstd"
 
     def usable(self, channel: int) -> bool:
-        """Whether messages of a channel can be understood."""
+        """Whether a channel is defined, and its schema if it has one."""
         known = self.channels.get(channel)
         return known is not None and (known.schema_id == 0 or known.schema_id in self.schemas)
 
@@ -78,7 +78,7 @@ class Definitions:
 
 
 class RepairWriter:
-    """One file being written again. ``write`` does it, ``close`` in any case; then the counts tell how it went."""
+    """Rewrites one file: call ``write``, and ``close`` in any case; then the counts describe the result."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class RepairWriter:
         provenance: Provenance,
         sequence: FileSequence | None = None,
     ) -> None:
-        """Create the file. ``sequence`` is what its messages have to follow, None where they may have any order."""
+        """Create the file. ``sequence`` checks the order of its messages, None if they may have any order."""
         self.contents = FileContents(target.name)
         self._sequence = sequence
         self.contents.schemas, self.contents.channels = definitions.schemas, definitions.channels
@@ -110,7 +110,7 @@ class RepairWriter:
 
         Raises:
             BagError: the damaged file cannot be read or is beyond the limits.
-            OSError: the disk refuses.
+            OSError: the disk cannot be written.
         """
         waiting: SoundChunk | None = None
         for piece in self._salvage.pieces():
@@ -145,7 +145,7 @@ class RepairWriter:
                 self._end_loose()
 
     def _put_chunk(self, piece: SoundChunk, *, last: bool) -> None:
-        """Write a chunk: as it stands if all of it is sound, else what is left of it."""
+        """Write a chunk: unchanged if all of it is sound, else only its sound messages."""
         found: list[Found] = []
         index: dict[int, list[int]] = {}
         end = others = 0
@@ -174,7 +174,7 @@ class RepairWriter:
             self._count(found)
 
     def _chosen(self, messages: Sequence[Found]) -> list[Found]:
-        """Return the messages that can be understood and follow each other; the others are dropped."""
+        """Return the messages that can be decoded and follow each other; count the others as dropped."""
         places = [self._is_usable(message) for message in messages]
         self._drop([message for message, usable in zip(messages, places, strict=True) if not usable])
         return [message for message, usable in zip(messages, places, strict=True) if usable]
@@ -193,7 +193,7 @@ class RepairWriter:
         return sequence is None or not sequence.fault(message.log_time, contents.type_of(channel), payload)
 
     def _define(self, channels: Iterable[int], inner: frozenset[tuple[type, int]] = frozenset()) -> None:
-        """Write the definitions of channels that no record has told of yet; ``inner`` stand in the chunk itself."""
+        """Write the definitions of channels that were not written yet; ``inner`` are in the chunk itself."""
         for number in sorted(channels):
             channel = self._definitions.channels[number]
             schema = self._definitions.schemas.get(channel.schema_id)
@@ -217,10 +217,10 @@ class RepairWriter:
 
 
 def kept(messages: Sequence[Found], type_of: Callable[[int], str], *, cut: bool) -> int:
-    """Return how many of a file's last messages belong to whole instants.
+    """Return how many of a file's last messages to keep, so that they end with a whole instant.
 
-    Where a chunk was ``cut`` the last instant may lack something, so it goes. Where the last scan's writes do not
-    follow it, everything from that scan on goes. Only our own messages have instants; of others all are kept.
+    If a chunk was ``cut``, the last instant may be incomplete and is dropped. If the last scan is not followed by its
+    writes, everything from that scan on is dropped. Only our own messages have instants; all others are kept.
     """
     count = len(messages)
     own = any(type_of(message.channel).startswith(_OWN) for message in messages)
@@ -235,13 +235,13 @@ def kept(messages: Sequence[Found], type_of: Callable[[int], str], *, cut: bool)
 
 
 def _lacks_writes(messages: Sequence[Found], type_of: Callable[[int], str]) -> bool:
-    """Whether a scan at the end of a file wrote more than the writes that follow it, and nothing else does."""
+    """Whether the last scan of a file is followed only by writes, and these are fewer than it made."""
     try:
         scan: Any = decode(SCAN, messages[0].payload)
         missing = len(scan.written.variable) + len(scan.committed.variable)
         for message in messages[1:]:
             if type_of(message.channel) != WRITE:
-                return False  # what follows a scan's writes is there, so they are whole; a force may have dropped some
+                return False  # a message after the scan's writes: they are complete; a force may have dropped some
             write: Any = decode(WRITE, message.payload)
             if write.kind in (WriteKind.COMMIT, WriteKind.BASIC):
                 missing -= len(write.values.variable)

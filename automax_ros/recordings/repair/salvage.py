@@ -1,7 +1,7 @@
-"""Reads what is sound in one mcap file, however it was cut or damaged: whole chunks, and the beginning of a cut one.
+"""Reads the sound parts of a cut or damaged mcap file: whole chunks, and the beginning of a cut one.
 
-A record counts if it lies in the file as a whole and can be parsed; a chunk or attachment with a checksum counts if the
-checksum is right. After a place where records cannot be told apart, the next compressed chunk is looked for.
+A record is sound if it is complete and can be parsed; a chunk or attachment with a checksum, if the checksum is right.
+After a place where records cannot be recognized, reading continues at the next compressed chunk.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from automax_ros.recordings.mcap.opening import NO_BAG_HINT, opened
 from automax_ros.recordings.mcap.unpacking import MAX_RECORD_BYTES, Unpacker
 
 _CHUNK_FIELDS = struct.Struct("<QQQII")
-"""What a chunk begins with: first and last time, size and checksum unpacked, length of the compression's name."""
+"""Beginning of a chunk: first and last time, unpacked size and checksum, length of the compression's name."""
 _MARKS = re.compile(rb"\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4")
 _LONGEST_MARK = 8
 _MARK_PLACE = RECORD_HEAD.size + 28
-"""Where in a chunk's record the name of its compression stands."""
+"""Offset of the length and name of the compression in a chunk's record."""
 _SEARCH_BYTES = 1 << 20
 _MAX_RESUMED = 1000
-"""Most places that make no sense that are passed over in one file."""
+"""Most unreadable places that are passed over in one file."""
 _MAX_REASONS = 20
 _KNOWN = frozenset(int(opcode) for opcode in Opcode)
 _FIRST_PRIVATE = 0x80
@@ -44,36 +44,36 @@ _Record = TypeVar("_Record")
 
 @dataclass(frozen=True)
 class SoundChunk:
-    """What can be used of a chunk: ``packed`` as it stands in the file, None where only ``data`` is left of it."""
+    """The sound part of a chunk: ``packed`` as it is in the file, None where only ``data`` could be recovered."""
 
     data: bytes
     packed: Chunk | None = None
     compression: str = ""
-    """That of the chunk of which ``data`` is left."""
+    """The compression of the chunk from which ``data`` was recovered."""
     cut: bool = False
-    """Whether more stood in the chunk."""
+    """Whether the chunk contained more than ``data``."""
 
 
 SoundPiece = SoundChunk | Schema | Channel | Attachment | Metadata | bytes
-"""A part of the file that is sound; bytes are the content of a message outside of chunks."""
+"""A sound part of the file; bytes are the content of a message outside of chunks."""
 
 
 @dataclass
 class DamagedFileReader:
-    """One file; ``pieces`` reads it once, and the other fields tell then how it went."""
+    """Reads one damaged file. After ``pieces`` has read it once, the other fields describe the damage."""
 
     path: Path
     finished: bool = False
-    """Whether the end of the data was reached; what is missing after it can be made again."""
+    """Whether the end of the data was reached; whatever is missing after it can be regenerated."""
     damage: list[str] = field(default_factory=list)
-    """What was found damaged, for the person."""
+    """Descriptions of the damage, for the user."""
     lost_chunks: int = 0
     lost_bytes: int = 0
     """Bytes of the data that could not be used."""
     _resumed: int = 0
 
     def pieces(self) -> Iterator[SoundPiece]:
-        """Return what is sound, in the order of the file.
+        """Yield the sound parts, in the order of the file.
 
         Raises:
             BagError: the file cannot be read or is beyond the limits, or is not a recording of ROS 2 at all.
@@ -115,7 +115,7 @@ class DamagedFileReader:
             position = end
 
     def _piece(self, opcode: int, content: bytes, unpacker: Unpacker) -> SoundPiece | None:
-        """Return what a whole record gives; of the summary only schemas and channels, which may be lost elsewhere."""
+        """Return the piece in a whole record; of the summary, only schemas and channels, in case others are lost."""
         if opcode == Opcode.SCHEMA:
             return self._parsed(Schema.read, content)
         if opcode == Opcode.CHANNEL:
@@ -148,7 +148,7 @@ class DamagedFileReader:
             return None
 
     def _cut_chunk(self, file: BinaryIO, unpacker: Unpacker) -> SoundChunk | None:
-        """Return the beginning of a chunk of which the file holds only a part."""
+        """Return the beginning of a chunk of which the file has only a part."""
         self.lost_chunks += 1
         content = file.read(MAX_RECORD_BYTES)
         if len(content) < _CHUNK_FIELDS.size:
@@ -167,7 +167,7 @@ class DamagedFileReader:
         return SoundChunk(data, compression=compression, cut=len(data) < size)
 
     def _resume(self, file: BinaryIO, position: int, size: int) -> int:
-        """Return where the next chunk begins after a place that makes no sense, or the end of the file."""
+        """Return the position of the next chunk after an unreadable place, or the end of the file."""
         self._resumed += 1
         start = size if self._resumed > _MAX_RESUMED else _next_chunk(file, position + 1, size)
         end = "the end" if start == size else f"byte {start}"
@@ -197,7 +197,7 @@ class DamagedFileReader:
 
 
 def parsed(parse: Callable[[ReadDataStream], _Record], content: bytes) -> _Record | None:
-    """Let the package mcap parse a record; None if it is malformed."""
+    """Parse a record by the package mcap; return None if it is malformed."""
     try:
         return parse(ReadDataStream(io.BytesIO(content)))
     except (McapError, struct.error, ValueError, OverflowError):
@@ -205,7 +205,7 @@ def parsed(parse: Callable[[ReadDataStream], _Record], content: bytes) -> _Recor
 
 
 def records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Return opcode, begin and end of the content of each whole record in a chunk's data; a cut one ends it."""
+    """Yield opcode, begin and end of the content of each whole record in a chunk's data, up to a cut or unknown one."""
     position = 0
     while position + RECORD_HEAD.size <= len(data):
         opcode, length = RECORD_HEAD.unpack_from(data, position)
@@ -217,7 +217,7 @@ def records(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def _next_chunk(file: BinaryIO, place: int, size: int) -> int:
-    """Return where a compressed chunk seems to begin, from a place on; the end of the file if there is none."""
+    """Return the position, from ``place`` on, of what looks like a compressed chunk, or the end of the file."""
     while place < size:
         file.seek(place)
         block = file.read(_SEARCH_BYTES + _MARK_PLACE)

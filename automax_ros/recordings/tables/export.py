@@ -1,7 +1,4 @@
-"""Recordings as CSV tables: common memory over time, or the scans of a task.
-
-Columns of the tables that a recording is exported to, and what is common to all formats of tables.
-"""
+"""Export of recordings to CSV tables, and the columns and rows that all table formats share."""
 
 from __future__ import annotations
 
@@ -24,9 +21,9 @@ from automax_ros.recordings.tables.series import WHOLE_RUN, Progress, Series, Wi
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading, the engineer's unit, the type code of its numbers, how a cell is written.
+    """A column: its heading, its engineering unit, the type code of its numbers, the function that formats a cell.
 
-    The type code is that of ``array``; texts have an empty one.
+    The type code is that of ``array``; it is empty for texts.
     """
 
     label: str
@@ -36,7 +33,7 @@ class Column:
 
 
 class Table(Protocol):
-    """What can be exported: rows of a time in ns and the cells that differ from the row before, None for unknown."""
+    """A table to export; a row is a time in ns and the cells that differ from the row before, None for unknown."""
 
     @property
     def columns(self) -> Sequence[Column]:
@@ -52,15 +49,15 @@ def column(label: str, kind: DataType, unit: str = "") -> Column:
 
 
 def count_column(label: str, unit: str = "") -> Column:
-    """Return a column of numbers that may pass 32 bits."""
+    """Return a column of integers that may need more than 32 bits."""
     return Column(label, unit, "q", _whole)
 
 
 def require_another_file(bag: Path, output: Path) -> None:
-    """Refuse to write over the recording that is read.
+    """Refuse to overwrite the recording that is read.
 
     Raises:
-        BagError: the output is one of its files.
+        BagError: the output is one of the recording's files.
     """
     own = [bag] if bag.is_file() else [*bag.glob("*.mcap*"), bag / "metadata.yaml"]
     for file in own:
@@ -70,7 +67,7 @@ def require_another_file(bag: Path, output: Path) -> None:
 
 
 def unwritable(output: Path, error: OSError) -> BagError:
-    """Return the error that says why an output cannot be written."""
+    """Return the error for an output that cannot be written."""
     return BagError("AMX6824", output, f"cannot be written: {error.strerror or error}")
 
 
@@ -104,13 +101,13 @@ _TYPECODES: dict[DataType, str] = {
 
 
 TIME = "time_s"
-"""Heading of the times, which count from the start of the run."""
+"""Heading of the column of times, which count from the start of the run."""
 
 
 class CommonTable:
     """Common memory as a table: a row for each instant at which a watched variable changed, or of the window's grid.
 
-    A value holds until it changes. Without ``watch`` all simple numeric and boolean variables are taken.
+    A value holds until it changes. Without ``watch`` all simple numeric and boolean variables are watched.
 
     Raises:
         BagError: the recording cannot be read or has no common memory, or a name in ``watch`` is unknown.
@@ -130,7 +127,7 @@ class CommonTable:
         """Return the rows: time, and the cells that differ from the row before.
 
         Raises:
-            BagError: the recording is damaged, or the window holds nothing.
+            BagError: the recording is damaged, or the window is empty.
         """
         yield from self._series.changes()
 
@@ -145,20 +142,20 @@ def export_csv(
     """Write the watched variables of a recording to a CSV file; return the number of rows below the header.
 
     Columns are ``time_s``, counted from the start of the run, and the variables with their type characters. A value
-    holds until it changes; a cell is empty as long as the recording has not told the value. Booleans are 0 and 1.
-    Without ``watch`` all simple numeric and boolean variables are taken; array elements are named like ``TABLE%(3)``.
-    Memory does not grow with the recording.
+    holds until it changes; a cell is empty until the recording contains a value for it. Booleans are 0 and 1.
+    Without ``watch`` all simple numeric and boolean variables are written; array elements are named like ``TABLE%(3)``.
+    Memory use does not grow with the recording.
 
     Raises:
-        BagError: the recording cannot be read or has no common memory, a name in ``watch`` is unknown, the window holds
-            nothing, or the output cannot be written.
+        BagError: the recording cannot be read or has no common memory, a name in ``watch`` is unknown, the window is
+            empty, or the output cannot be written.
     """
     require_another_file(bag, output)
     return write_csv(CommonTable(bag, watch, window, progress), output)
 
 
 def write_csv(table: Table, output: Path) -> int:
-    """Write a table to a CSV file, which appears when it is whole; return the number of its rows.
+    """Write a table to a CSV file, which appears only when it is complete; return the number of its rows.
 
     Raises:
         BagError: the recording is damaged, or the output cannot be written.

@@ -16,7 +16,7 @@ from automax_ros.recordings.read.common_log import Cell
 from automax_ros.recordings.tables.export import TIME, Column, Table, unwritable
 
 MAX_BYTES = 256 << 20
-"""Most bytes of all columns of an .npz export (decision): they are put together in memory."""
+"""Most bytes of all columns of an .npz export (decision): they are collected in memory."""
 _CHECK_MASK = 0xFFF
 _DTYPES = {"b": np.bool_, "i": np.int32, "q": np.int64, "d": np.float64}
 
@@ -25,7 +25,7 @@ def write_npz(bag: Path, table: Table, output: Path) -> int:
     """Write a table to a NumPy file; return the number of its rows. ``bag`` is named in errors.
 
     ``time_s`` is float64; integers are int32, REALs float64, booleans bool; the number of a scan is int64. A column
-    with cells that are not known is float64, with NaN there. ``names`` are the headings, ``units`` their units.
+    with unknown cells is float64, with NaN for those. ``names`` are the headings, ``units`` their units.
 
     Raises:
         BagError: a column holds texts, the columns take more than ``MAX_BYTES``, the recording is damaged, or the
@@ -59,7 +59,7 @@ def write_npz(bag: Path, table: Table, output: Path) -> int:
 
 
 class _Numbers:
-    """One column while it grows."""
+    """Collects the values of one column."""
 
     def __init__(self, column: Column, bag: Path) -> None:
         self._column = column
@@ -74,7 +74,7 @@ class _Numbers:
         return self._numbers.itemsize * len(self._numbers) + self._unknown.itemsize * len(self._unknown)
 
     def hold(self, value: Cell | None) -> None:
-        """Take the value that holds from this row on."""
+        """Set the value that holds from this row on."""
         if value is None:
             self._held = None
             return

@@ -19,12 +19,12 @@ _HINT = "write TASK.NAME, such as SPEED.RATIO%, or TASK.NAME(3) for an element"
 
 
 def is_local(name: str) -> bool:
-    """Whether a name that was asked for means a local of a task: names of commons have no period."""
+    """Whether a requested name is that of a task's local: names of commons have no period."""
     return "." in name
 
 
 class WatchedLocals:
-    """The locals that are watched. Their types are told by their names; the first TaskState says where they stand.
+    """The watched locals. Their names determine their types, the first TaskState their places.
 
     Raises:
         BagError: a name is not that of a local, or that of a text.
@@ -40,7 +40,7 @@ class WatchedLocals:
         return bool(self._asked)
 
     def add(self, column: int, asked: str) -> Watched:
-        """Watch one more local, in the column of that index unless it has one already; return its description."""
+        """Watch a local, in the column of this index unless it has one already; return its description."""
         match = _NAME.fullmatch(" ".join(asked.upper().split()))
         if match is None:
             raise BagError("AMX6821", self._bag, f"{asked[:80]!r} is not a name of a local", _HINT)
@@ -55,10 +55,10 @@ class WatchedLocals:
         return self._columns[label]
 
     def values(self, state: TaskState) -> Iterator[tuple[int, float]]:
-        """Return column and value of each watched local in a state.
+        """Yield column and value of each watched local in a state.
 
         Raises:
-            BagError: the task has no such local, or the state does not fit together.
+            BagError: the task has no such local, or the state is inconsistent.
         """
         asked = self._asked.get(state.task)
         if asked is None:
@@ -72,10 +72,10 @@ class WatchedLocals:
             yield column, state.value[place]
 
     def require_all(self) -> None:
-        """Make sure that the recording has told the states of all tasks that were asked for.
+        """Check that the recording contained states of all requested tasks.
 
         Raises:
-            BagError: it has not.
+            BagError: it contained none of a task.
         """
         missing = [task for task in self._asked if task not in self._places]
         if missing:
@@ -83,7 +83,7 @@ class WatchedLocals:
             raise BagError("AMX6827", self._bag, f"holds no states of a task {missing[0][:40]!r}", hint)
 
     def _found(self, state: TaskState, asked: Sequence[tuple[int, str, int]]) -> list[tuple[int, int]]:
-        """Where the fields that were asked for stand in the values of a state: (column, place)."""
+        """Return the column and the place in a state's values of each requested field."""
         fields: dict[str, tuple[int, int]] = {}
         place = 0
         for name, size in zip(state.field, state.size, strict=False):

@@ -29,19 +29,19 @@ UNITS = {
     "stored_j": "J",
     "shaft_j": "J",
 }
-"""The signals that are REALs, with their units; ``bridge`` is an INTEGER, ``contactor`` a BOOLEAN."""
+"""Units of the signals that are REALs; ``bridge`` is an INTEGER, ``contactor`` a BOOLEAN."""
 _KINDS = {**dict.fromkeys(UNITS, DataType.REAL), "bridge": DataType.INTEGER, "contactor": DataType.BOOLEAN}
 _NAME = re.compile(r"(?P<plant>[A-Z][A-Z0-9_]{0,63})/(?P<signal>[A-Z_]{1,40})")
 _HINT = "write PLANT/SIGNAL, such as UNWIND/current_a"
 
 
 def is_plant(name: str) -> bool:
-    """Whether a name that was asked for means a signal of a plant: no other has a slash."""
+    """Whether a requested name is that of a plant's signal: no other name has a slash."""
     return "/" in name
 
 
 class WatchedPlants:
-    """The signals of plants that are watched.
+    """The watched signals of plants.
 
     Raises:
         BagError: a name is not that of a signal.
@@ -54,7 +54,7 @@ class WatchedPlants:
         self._seen: set[str] = set()
 
     def add(self, column: int, asked: str) -> Watched:
-        """Watch one more signal, in the column of that index unless it has one already; return its description."""
+        """Watch a signal, in the column of this index unless it has one already; return its description."""
         match = _NAME.fullmatch("".join(asked.upper().split()))
         if match is None:
             raise BagError("AMX6821", self._bag, f"{asked[:80]!r} is not a name of a plant's signal", _HINT)
@@ -70,16 +70,16 @@ class WatchedPlants:
         return self._columns[label]
 
     def values(self, state: PlantState) -> Iterator[tuple[int, float]]:
-        """Return column and value of each watched signal in the state of a plant."""
+        """Yield column and value of each watched signal in the state of a plant."""
         self._seen.add(state.plant)
         for column, signal in self._asked.get(state.plant, ()):
             yield column, getattr(state, signal)
 
     def require_all(self) -> None:
-        """Make sure that the recording has told of all plants that were asked for.
+        """Check that the recording contained states of all requested plants.
 
         Raises:
-            BagError: it has not.
+            BagError: it contained none of a plant.
         """
         missing = [plant for plant in self._asked if plant not in self._seen]
         if missing:

@@ -1,4 +1,4 @@
-"""The scans of one task as a table: what each latched or read, what it wrote, its errors, and its locals."""
+"""The scans of one task as a table: the values that each latched, read and wrote, its errors, and its locals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from automax_ros.recordings.tables.series import WHOLE_RUN, Progress, Window
 
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("Scan", "TaskState", "VariableTable"))
 _LOCAL = re.compile(r"[A-Z_][A-Z0-9_]{0,63}[%!@]?")
-"""Fields of a state that are variables of the task; those of blocks have blanks and periods."""
+"""Names of state fields that are variables of the task; those of blocks contain blanks and periods."""
 _OWN = (
     count_column("scan"),
     count_column("duration_ns", "ns"),
@@ -30,7 +30,7 @@ _OWN = (
     count_column("error_line"),
     count_column("error_code"),
 )
-"""What every scan says of itself; line and code are those of its first error, 0 without one."""
+"""Columns of every scan; line and code are those of its first error, 0 without one."""
 
 
 class ScanTable:
@@ -38,9 +38,9 @@ class ScanTable:
 
     Columns: ``scan``, ``duration_ns``, ``skipped``, ``errors`` (how many), ``error_line``, ``error_code`` (of the
     first), then ``in.NAME`` for each variable that the task latches or reads, ``out.NAME`` for each that it writes, and
-    ``local.NAME`` for each local where a state was recorded after every scan. A value holds until the next one is told;
-    ``out`` begins as it was latched or read. After missing scans the ``in`` values are unknown until the recording
-    tells them all. The recording is read twice: first to find the columns.
+    ``local.NAME`` for each local where a state was recorded after every scan. A value holds until the next one is
+    recorded; ``out`` begins as it was latched or read. After missing scans the ``in`` values are unknown until a scan
+    contains them all. The recording is read twice, first to find the columns.
 
     Raises:
         BagError: the recording cannot be read, has no table of variables, or has no scan of the task.
@@ -106,13 +106,13 @@ class ScanTable:
             raise BagError("AMX6825", self._bag, f"holds no scan of {self._task} in the range asked for", hint)
 
     def _told(self, scan: Scan) -> dict[int, Cell | None]:
-        """What a scan tells of its inputs and outputs, by column."""
+        """Return the inputs and outputs in a scan's message, by column."""
         log, stamp = self._log, scan.stamp
         told: dict[int, Cell | None] = {}
         own: set[Key] = set()
         for entry in log.entries(scan.latched, stamp):
             told[self._inputs[entry[:2]]] = entry[2]
-        for entry in log.reads(scan.read, stamp):  # the first time counts: later it may have written it itself
+        for entry in log.reads(scan.read, stamp):  # the first read counts: a later one may see the scan's own write
             index = self._inputs.get(entry[:2])
             if index is not None and entry[:2] not in own:
                 own.add(entry[:2])
@@ -131,7 +131,7 @@ class ScanTable:
         return {index: _local_value(self._columns[index], values[at]) for index, at in self._locals if at < len(values)}
 
     def _scans(self, *, first_half: bool) -> Iterator[tuple[int, Scan | TaskState]]:
-        """The task's scans and states up to the end of the window."""
+        """Yield the task's scans and states up to the end of the window."""
         reader = self._reader
         if self._progress is not None:
             progress = self._progress
@@ -174,7 +174,7 @@ class ScanTable:
             self._add_locals(first)
 
     def _add_locals(self, state: TaskState) -> None:
-        """Add a column for each local, elements of arrays counted through."""
+        """Add a column for each local and for each element of local arrays."""
         self._layout, place = state.layout_hash, 0
         for name, size in zip(state.field, state.size, strict=False):
             kind = type_of_name(name)
@@ -210,9 +210,9 @@ def _local_value(place: Column, value: float) -> Cell:
 
 
 _MOST_LOCALS = 10_000
-"""Columns of locals at most (decision)."""
+"""Most columns of locals (decision)."""
 _MOST_NAMES = 1000
-"""Names of tasks that are kept for the hint; a rack has fewer."""
+"""Most names of tasks kept for the hint, and most elements of a local with columns; a rack has fewer tasks."""
 
 
 def _own_cells(scan: Scan) -> dict[int, Cell | None]:

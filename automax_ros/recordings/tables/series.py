@@ -1,4 +1,4 @@
-"""The values of watched commons over time: an instant, and what changed in it; for tables and pictures."""
+"""The values of watched variables over time, as instants with the values that changed; for tables and pictures."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ _PLANT = "automax_msgs/msg/PlantState"
 Change = tuple[int, dict[int, Cell]]
 """Nanoseconds from the start of the run, and the new values by index of column."""
 Progress = Callable[[float], None]
-"""Takes the share that is done, 0 to 1."""
+"""Called with the share that is done, 0 to 1."""
 TakeWrites = Callable[[int, WriterKind, Sequence[tuple[str, Cell]]], None]
-"""Takes the time from the start of the run in ns, who has written, and names with values."""
+"""Called with the time from the start of the run in ns, the writer, and names with values."""
 _OUTSIDE = (WriterKind.ROS, WriterKind.OPERATOR)
 
 
 @dataclass(frozen=True)
 class Window:
-    """The part of a run that is wanted, and its grid; nanoseconds from the start of the run.
+    """A part of a run and its grid; nanoseconds from the start of the run.
 
-    ``end_ns`` None is the end of the recording. ``step_ns`` above 0 wants the values at ``start_ns`` and after each
-    step.
+    ``end_ns`` None is the end of the recording. With ``step_ns`` above 0, values are given at ``start_ns`` and after
+    each step.
     """
 
     start_ns: int = 0
@@ -63,7 +63,7 @@ class Window:
     step_ns: int = 0
 
     def holds(self, time_ns: int) -> bool:
-        """Whether an instant lies in it."""
+        """Whether an instant is in the window."""
         return time_ns >= self.start_ns and (self.end_ns is None or time_ns <= self.end_ns)
 
 
@@ -76,8 +76,8 @@ class Series:
     Without ``watch`` all simple numeric and boolean variables are watched; array elements are named like ``TABLE%(3)``,
     locals of tasks like ``SPEED.RATIO%``, signals of plants like ``UNWIND/current_a``.
     ``columns`` are the watched variables, ``rack`` and ``origin_ns`` the rack's name and the stamp at the start of its
-    run; ``end_ns`` is the end of what was read, once it is read. ``take_scan``, if given, is called with each scan of
-    the window, ``take_writes`` with what operators, stimuli and ROS have written: who, and names with their values.
+    run; ``end_ns`` is the end of the part that was read, after reading. ``take_scan``, if given, is called with each
+    scan of the window, ``take_writes`` with the writes of operators, stimuli and ROS: writer, and names with values.
 
     Raises:
         BagError: the recording cannot be read or has no common memory, or a name in ``watch`` is unknown.
@@ -116,12 +116,13 @@ class Series:
         self._require_few_rows(progress)
 
     def changes(self) -> Iterator[Change]:
-        """Return the instants of the window at which something changed, or those of its grid.
+        """Yield the instants of the window at which something changed, or those of its grid.
 
-        The first one inside of a window says what holds there already. No value is told before the recording tells it.
+        The first one includes the values that hold since before the window. A value is unknown until the recording
+        contains it.
 
         Raises:
-            BagError: the recording is damaged, or the window holds nothing, or too many rows.
+            BagError: the recording is damaged, or the window is empty or has too many rows.
         """
         found = False
         changes = self._in_window(self._all_changes())
@@ -153,7 +154,7 @@ class Series:
         return list(watched.values())
 
     def _all_changes(self) -> Iterator[Change]:
-        """Each instant of the recording with a change; the writes of one instant together."""
+        """Yield each instant of the recording with a change; the writes of one instant together."""
         values, instant = self._values, self.origin_ns
         for entry in self._messages:
             message = entry.message
@@ -195,7 +196,7 @@ class Series:
                 self._take_scan(time, message)
 
     def _tell_writes(self, message: CommonWrite, entries: Iterable[Entry]) -> None:
-        """Tell what came from outside; the registers under I/O points are the same write once more."""
+        """Report a write from outside, without the registers under I/O points, which repeat the same write."""
         writer, time = self._outside.get(message.writer), max(0, message.stamp - self.origin_ns)
         if writer is None or message.kind != WriteKind.OUTSIDE or not self._window.holds(time):
             return
@@ -206,7 +207,7 @@ class Series:
         self._take_writes(time, writer, found)
 
     def _in_window(self, changes: Iterator[Change]) -> Iterator[Change]:
-        """Leave out what is not wanted; begin with what holds at the start of the window."""
+        """Yield the changes within the window, beginning with the values that hold at its start."""
         start, end = self._window.start_ns, self._window.end_ns
         if not start and end is None:
             yield from changes
@@ -235,7 +236,7 @@ class Series:
             yield start, held
 
     def _on_grid(self, changes: Iterator[Change]) -> Iterator[Change]:
-        """The instants of the grid, from the first at which something is known, with what changed since the last."""
+        """Yield the instants of the grid, from the first with a known value, with the changes since the last one."""
         step = self._window.step_ns
         due: int | None = None
         held: dict[int, Cell] = {}
@@ -256,7 +257,7 @@ class Series:
             due += step
 
     def _require_few_rows(self, progress: Progress | None) -> None:
-        """Refuse a grid with too many rows before any of them is made."""
+        """Refuse a grid with too many rows before any row is made."""
         start, end, step = self._window.start_ns, self._window.end_ns, self._window.step_ns
         if not step or (end is not None and (end - start) // step < MAX_GRID_ROWS):
             return

@@ -1,4 +1,4 @@
-"""Lines for pictures: the course of a variable with no more points than a picture can show, and no peak lost."""
+"""Lines for pictures: a variable over time, with no more points than a picture can show and no peak lost."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from automax_ros.recordings.read.common_log import Watched
 from automax_ros.recordings.tables.series import WHOLE_RUN, Progress, Series, TakeWrites, Window
 
 MAX_POINTS = 1 << 16
-"""As many points of a line are kept as they are; a longer one is thinned to four points per column."""
+"""Most points of a line; a longer one is thinned to four points per column."""
 COLUMNS = 1 << 12
-"""Columns that a line is thinned to: no picture is wider."""
+"""Number of columns that a line is thinned to; no picture is wider."""
 MAX_LINES = 64
 """Most variables in one plot (decision: more cannot be told apart)."""
 MAX_ERRORS = 1000
-"""Most errors that are marked; the first ones are."""
+"""Number of errors that are marked, the first ones."""
 Floats = npt.NDArray[np.float64]
 
 
 class Role(enum.IntEnum):
-    """What a line is among those of its lane, in the order of meaning: what is wanted, what comes of it, what is so."""
+    """The role of a line in its lane: reference, lagged reference, feedback, the plant's value, or another."""
 
     REFERENCE = 0
     LAGGED = 1
@@ -42,7 +42,7 @@ class Role(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Line:
-    """The course of one variable: each value holds from its time, in s of the run, to the next."""
+    """One variable over time: each value holds from its time, in s of the run, to the next."""
 
     variable: Watched
     times: Floats
@@ -62,7 +62,7 @@ class ErrorMark:
 
 @dataclass(frozen=True)
 class Traces:
-    """What a picture shows: the rack, the range in s, a line for each variable, errors and how many more there are."""
+    """The contents of a picture: rack, range in s, a line for each variable, errors, the number of further errors."""
 
     rack: str
     start_s: float
@@ -80,9 +80,9 @@ def traces(
     take_scan: Callable[[int, Scan], None] | None = None,
     take_writes: TakeWrites | None = None,
 ) -> Traces:
-    """Return the lines of variables such as ``REF%``, ``RUN@`` and ``TABLE%(3)``, in memory of bounded size.
+    """Return the lines of variables such as ``REF%``, ``RUN@`` and ``TABLE%(3)``, in bounded memory.
 
-    ``take_scan`` and ``take_writes`` get what ``Series`` tells them on the way.
+    ``take_scan`` and ``take_writes`` are called as by ``Series``.
 
     Raises:
         BagError: the recording cannot be read, a name is unknown or a text, there are too many, or the window is empty.
@@ -112,7 +112,7 @@ def traces(
 def thinned(times: Floats, values: Floats, columns: int) -> tuple[Floats, Floats]:
     """Return the first, last, least and greatest point of each of ``columns`` equal spans of time.
 
-    The times must not fall. Where a line is shorter than that already it comes back unchanged.
+    The times must not decrease. A line that is short enough is returned unchanged.
     """
     if len(times) <= 4 * columns:
         return times, values
@@ -129,14 +129,14 @@ def thinned(times: Floats, values: Floats, columns: int) -> tuple[Floats, Floats
 
 
 class Course:
-    """One line while it grows: times in s that do not fall, numbers that are finite; bounded in size."""
+    """Collects the points of one line, in bounded memory: times in s that do not decrease, finite numbers."""
 
     def __init__(self) -> None:
         self._times = array("d")
         self._values = array("d")
 
     def append(self, time_s: float, value: float) -> None:
-        """Add a value; a time before the last one counts as that."""
+        """Add a value; an earlier time than the last one is replaced by it."""
         if self._times and time_s < self._times[-1]:
             time_s = self._times[-1]
         self._times.append(time_s)
@@ -151,14 +151,14 @@ class Course:
 
 
 class ErrorMarks:
-    """The errors of all tasks: the first ones with their places, and how many more there were."""
+    """Collects the errors of all tasks: the first ones with their places, and the number of further ones."""
 
     def __init__(self) -> None:
         self.marks: list[ErrorMark] = []
         self.unmarked = 0
 
     def take(self, time_ns: int, scan: Scan) -> None:
-        """Take the errors of a scan; its time counts from the start of the run."""
+        """Add the errors of a scan; its time counts from the start of the run."""
         for error in scan.errors:
             if len(self.marks) < MAX_ERRORS:
                 self.marks.append(ErrorMark(time_ns / NS_PER_S, scan.task, error.line, error.code))

@@ -1,7 +1,7 @@
-"""Compresses and writes chunks on a thread of its own, one after the other: no scan waits for it.
+"""Compresses and writes chunks in a separate thread, one after the other, so that no scan waits for it.
 
-At most one chunk is under way: who hands over the next one waits until the one before is in the file. So a killed
-process loses the open chunk and one under way, order and bytes are those of one thread, and memory is bounded.
+At most one chunk is being written: handing over the next one waits until the previous one is in the file. So a killed
+process loses the open chunk and the one being written, order and bytes are those of one thread, and memory is bounded.
 """
 
 from __future__ import annotations
@@ -12,36 +12,36 @@ from collections.abc import Callable
 from queue import SimpleQueue
 
 _HAND_OVER_S = 0.0005
-"""Longest wait for the thread to take a chunk over, s (decision): Python lets another thread go on only where this one
+"""Longest wait for the thread to accept a chunk, s (decision): Python switches to another thread only where this one
 waits or after 5 ms, in which a simulated rack has filled the next chunks."""
 _LOOK_S = 0.05
-"""Pause between two looks whether a job is done, s: where two wait, or a wait was interrupted."""
+"""Pause between two checks whether a job is done, s: where two threads wait, or a wait was interrupted."""
 
 _Job = Callable[[], None]
 
 
 class ChunkThread:
-    """Carries out one job after the other. The thread begins with the first and ends with this object."""
+    """Carries out jobs one after the other. The thread starts with the first job and ends with this object."""
 
     def __init__(self) -> None:
-        """Begin without a thread."""
+        """Create the object without a thread."""
         self._worker: threading.Thread | None = None
         self._calls: SimpleQueue[bool] = SimpleQueue()
         self._jobs: deque[_Job] = deque()
-        """The job under way, or none."""
+        """The present job, or none."""
         self._taken, self._done = threading.Lock(), threading.Lock()
-        """Free when the job was taken over, and when it is done."""
+        """Free when the job was accepted, and when it is done."""
         self._failed: list[Exception] = []
 
     def __del__(self) -> None:
-        """Let the thread end."""
+        """End the thread."""
         self._calls.put(False)
 
     def hand(self, job: _Job) -> None:
-        """Let a job be carried out once the one before is; a quick job may be done when this returns.
+        """Hand over a job, after the previous one is done; a quick job may be done on return.
 
         Raises:
-            Exception: what a job before has raised; this one is not carried out.
+            Exception: that of a previous job; this one is not carried out.
         """
         if self._worker is None:
             self._begin()
@@ -52,24 +52,24 @@ class ChunkThread:
         self._taken.acquire(timeout=_HAND_OVER_S)
 
     def settle(self) -> None:
-        """Wait until no job is under way.
+        """Wait until no job is left.
 
         Raises:
-            Exception: what a job has raised.
+            Exception: that of a job.
         """
         while self._jobs:
             if not self._done.acquire(timeout=_LOOK_S):
-                self._calls.put(True)  # a signal may have struck between the job and its call
+                self._calls.put(True)  # a signal may have interrupted between the job and its call
         if self._failed:
             raise self._failed.pop()
 
     @property
     def failed(self) -> bool:
-        """Whether a job has raised what ``settle`` has not told yet."""
+        """Whether a job has raised an exception that ``settle`` has not raised yet."""
         return bool(self._failed)
 
     def end(self) -> None:
-        """Let the thread end after the job under way."""
+        """End the thread after the present job."""
         if self._worker is not None:
             self._calls.put(False)
             self._worker.join()
@@ -93,7 +93,7 @@ def _work(
             _free(taken)
             try:
                 jobs[0]()
-            except Exception as error:  # told to whoever hands over the next
+            except Exception as error:  # raised when the next job is handed over
                 failed.append(error)
             jobs.popleft()
             _free(done)

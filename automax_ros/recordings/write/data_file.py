@@ -1,7 +1,4 @@
-"""The file that a recording is written to, and how it reaches the disk.
-
-How a recording is stored: compression, size of its files, time of its chunks.
-"""
+"""The data file of a recording, and the options for storing it: compression, file size, time of a chunk."""
 
 from __future__ import annotations
 
@@ -14,20 +11,20 @@ from pathlib import Path
 from automax_ros.core.ticks import NS_PER_S
 
 CHUNK_NS = NS_PER_S // 2
-"""A chunk ends with each of these times of the messages, ns (decision: one is open and one is being written, so a
+"""Period of the messages' time at which chunks end, ns (decision: one is open and one is being written, so a
 killed process loses a second at most)."""
 COMPRESSIONS = {"zstd": "zstd", "lz4": "lz4", "none": ""}
-"""How chunks can be compressed: the word for it, and what the file calls it."""
+"""Compressions of chunks: the name of the option, and the name in the file."""
 MIN_SPLIT_BYTES = 1 << 16
-"""Smallest size to split a recording at (decision): a smaller file holds little but the facts at its beginning."""
+"""Smallest size at which a recording is split (decision): a smaller file has little but the facts at its beginning."""
 
 
 @dataclass(frozen=True)
 class StorageOptions:
-    """How a recording is stored.
+    """Options for storing a recording.
 
     ``compression`` is a key of COMPRESSIONS. A file ends when it has ``split_bytes`` bytes, 0 for never. A chunk ends
-    each ``chunk_ns`` of the messages' time: a killed process loses two of them at most.
+    every ``chunk_ns`` of the messages' time: a killed process loses two of them at most.
     """
 
     compression: str = "zstd"
@@ -35,7 +32,7 @@ class StorageOptions:
     chunk_ns: int = CHUNK_NS
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense.
+        """Check the options.
 
         Raises:
             ValueError: an unknown compression, or a size or time out of range.
@@ -51,7 +48,7 @@ class StorageOptions:
 
 
 class DataFile:
-    """A new file, unbuffered; what a failed write left in it is cut off again."""
+    """A new file, unbuffered; after a failed write it is truncated to its former size."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -60,7 +57,7 @@ class DataFile:
         self._lock = threading.Lock()
 
     def write(self, data: bytes) -> int:
-        """Append all of the bytes."""
+        """Append all bytes."""
         rest = memoryview(data)
         try:
             while rest:
@@ -72,11 +69,11 @@ class DataFile:
         return len(data)
 
     def tell(self) -> int:
-        """Return how many bytes stand in it."""
+        """Return the number of bytes in the file."""
         return self._size
 
     def sync(self) -> None:
-        """Wait until everything has reached the disk itself. May be called from another thread."""
+        """Wait until everything is on the disk. May be called from another thread."""
         with self._lock:
             descriptor = -1 if self._file.closed else os.dup(self._file.fileno())
         if descriptor >= 0:
@@ -86,13 +83,13 @@ class DataFile:
                 os.close(descriptor)
 
     def close(self) -> None:
-        """Close it."""
+        """Close the file."""
         with self._lock:
             self._file.close()
 
 
 def sync_path(path: Path) -> None:
-    """Wait until a file or folder is on the disk itself."""
+    """Wait until a file or folder is on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -1,4 +1,4 @@
-"""The recorder: a rack's stream into a bag, with the rack's file and all sources stored inside."""
+"""Records a rack's stream into a bag, with the rack's file and all sources stored inside."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from automax_ros.recordings.write.writer import BagWriter
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 _FIRST = EventKey(EventClass.OUTSIDE, -1, "")
-"""Before everything else of an instant: the rack stands as the instant before has left it."""
+"""Before all other events of an instant: the rack is in the state that the previous instant left."""
 
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """What is recorded, and into how many files.
+    """Options that select what is recorded, and into how many files.
 
     A file ends at each multiple of ``split_ns`` of rack time, 0 for never. ``tasks`` are those whose scans and states
     are recorded, None for all; common memory is always recorded whole. ``every_state``: a state after each such scan.
@@ -35,13 +35,13 @@ class RecordingOptions:
 
 
 class Recorder(Recording):
-    """Records one run. Make it before the rack is started; ``close`` finishes the bag.
+    """Records one run. Create it before the rack is started; ``close`` finishes the bag.
 
-    When the disk refuses, recording ends and ``failure`` says why; the rack goes on.
+    If the disk cannot be written, recording ends and ``failure`` is the reason; the rack continues.
     """
 
     def __init__(self, rack: Rack, stream: RackStream, folder: Path, options: RecordingOptions | None = None) -> None:
-        """Create the bag and take part in the stream.
+        """Create the bag and subscribe to the stream.
 
         Raises:
             RecordingError: the folder exists already or cannot be written.
@@ -69,9 +69,9 @@ class Recorder(Recording):
         self._takes = stream.add_sink(self._sink, tasks=options.tasks, every_state=options.every_state)
 
     def flush(self, now_ns: int) -> None:
-        """Hand the chunk whose time is over at a rack time to the operating system, though nothing has happened since.
+        """Hand a chunk whose time has passed at a rack time to the operating system, even without new messages.
 
-        On the wall clock to be called every now and then; in simulated time the next message does it.
+        To be called periodically on the wall clock; in simulated time the next message does it.
         """
         self._flush(self._stream.stamp(now_ns))
 
@@ -80,7 +80,7 @@ class Recorder(Recording):
         self._finish()
 
     def _sink(self, topic: Topic) -> Take:
-        """Return what records a topic."""
+        """Return the function that records messages of a topic."""
         channel = self._writer.channel(topic.name, topic.type_name, topic.qos)
         writer = self._writer
 
@@ -99,14 +99,14 @@ class Recorder(Recording):
 
         def take_and_store(stamp: int, payload: bytes) -> None:
             take_and_measure(stamp, payload)
-            self.store(files_of(self._rack))  # what was done may have been a reload
+            self.store(files_of(self._rack))  # the operation may have been a reload
 
         if topic == self._stream.operations_topic:
             return take_and_store
         return take_and_measure if self._splits_by_size else take
 
     def _split(self, now_ns: int) -> None:  # noqa: ARG002
-        """Begin the next file: an event of the scheduler, so that no scan is under way."""
+        """Begin the next file; called as an event of the scheduler, between scans."""
         self._split_posted = False
         if self.failure is not None:
             return

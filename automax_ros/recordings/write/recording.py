@@ -1,4 +1,4 @@
-"""What the recorder of a rack of ours and that of a rack elsewhere have in common: a bag that may fail and says why."""
+"""The base of recorders, of a rack in this process or elsewhere: a bag with the rack's files, which may fail."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from automax_ros.recordings.write.writer import BagWriter
 class Recording:
     """A bag being recorded, with the rack's files in it.
 
-    When the disk refuses, recording ends and ``failure`` says why; whoever sends the messages goes on.
+    If the disk cannot be written, recording ends and ``failure`` is the reason; the sender of the messages continues.
     """
 
     def __init__(self, writer: BagWriter, files: Iterable[RackFile]) -> None:
         """Store the files.
 
         Raises:
-            RecordingError: the disk refuses at once.
+            RecordingError: the disk cannot be written.
         """
         self.failure: RecordingError | None = None
         self._writer = writer
@@ -30,26 +30,26 @@ class Recording:
         self._store(files)
 
     def store(self, files: Iterable[RackFile]) -> None:
-        """Store files that are not stored as they are now, such as the source of a task that was reloaded."""
+        """Store files that are new or have changed, such as the source of a reloaded task."""
         if self.failure is None:
             with self._enduring():
                 self._store(files)
 
     def sync(self) -> None:
-        """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
+        """Wait until flushed data are on the disk. May take long: to be called from another thread."""
         self._writer.sync()
 
     def sync_at_end(self) -> None:
-        """Wait until the disk itself has the closed bag."""
+        """Wait until the closed bag is on the disk."""
         self.sync()
         with self._enduring():
             self._writer.require_synced()
 
     def _store(self, files: Iterable[RackFile]) -> None:
-        """Store files that are not stored as they are now.
+        """Store files that are new or have changed.
 
         Raises:
-            RecordingError: the disk refuses.
+            RecordingError: the disk cannot be written.
         """
         for file in files:
             if self._stored.get(file.name) != file:
@@ -58,14 +58,14 @@ class Recording:
 
     @contextmanager
     def _enduring(self) -> Iterator[None]:
-        """Let a disk that refuses end the recording; once it has, that stays the failure."""
+        """Catch an error of the disk, which ends the recording; the first one stays the ``failure``."""
         try:
             yield
         except RecordingError as error:
             self.failure = self.failure or error
 
     def _flush(self, stamp: int) -> None:
-        """Hand the open chunk to the operating system if its time is over at a stamp."""
+        """Hand the open chunk to the operating system if its time has passed at a stamp."""
         if self.failure is None:
             with self._enduring():
                 self._writer.flush(stamp)

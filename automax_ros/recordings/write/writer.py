@@ -1,8 +1,8 @@
-"""Writes a recording: a folder with ``scans_0.mcap``, ... and ``metadata.yaml``, as rosbag2 makes them.
+"""Writes a recording: a folder with ``scans_0.mcap``, ... and ``metadata.yaml``, in the format of rosbag2.
 
-The same messages give the same bytes: nothing depends on the folder's name, the host or the wall clock. Chunks end by
-size or with half a second, always between two instants. One reaches the operating system while the next is filled, or
-before that, so that a killed process loses a second at most and no instant by half.
+The same messages give the same bytes: nothing depends on the folder's name, the host or the wall clock. A chunk ends
+by size or after half a second, always between two instants. It is handed to the operating system while the next one is
+filled, or earlier, so that a killed process loses a second at most and only whole instants.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from automax_ros.recordings.write.chunk_thread import ChunkThread
 from automax_ros.recordings.write.data_file import COMPRESSIONS, DataFile, StorageOptions, sync_path
 
 AT_ONCE_BYTES: Final = 1 << 16
-"""A chunk of up to this many bytes, uncompressed, is written by whoever fills it where no clock is kept pace with
+"""A chunk of up to this many bytes, uncompressed, is written in the calling thread where no clock is followed
 (decision): it takes 0.1 ms, and handing it to a thread takes longer than that."""
 CHUNK_BYTES: Final = 1 << 20
-"""A chunk ends before the next instant when it holds more bytes than this, uncompressed."""
+"""A chunk ends before the next instant if it has more bytes than this, uncompressed."""
 LONGEST_CHUNK_BYTES: Final = 24 << 20
-"""A chunk of more bytes than this ends even inside an instant, so that every reader takes it."""
+"""A chunk with more bytes than this ends even within an instant, so that every reader accepts it."""
 MAX_PAYLOAD_BYTES = 32 << 20
 """Longest message and longest attachment that is written, in bytes (decision: our own reader is sure to accept it)."""
 MAX_STAMP = (2**31 - 1) * NS_PER_S
@@ -57,7 +57,7 @@ def _always() -> bool:
 
 
 class Channel:
-    """One topic of a recording; :meth:`BagWriter.channel` makes them. ``message_count`` counts over all files."""
+    """One topic of a recording, created by :meth:`BagWriter.channel`. ``message_count`` counts over all files."""
 
     __slots__ = ("message_count", "number", "qos", "topic", "type_name")
 
@@ -70,12 +70,12 @@ class Channel:
 
 
 class BagWriter:
-    """A recording being written; a context manager that finishes the files at its end.
+    """Writes a recording; a context manager that finishes the files at its end.
 
-    ``custom_data`` goes into the metadata (provenance: hashes of program and YAML file, version). ``keeps_pace`` tells
-    whether whoever writes follows a clock and may not wait for a chunk to be compressed, however small.
+    ``custom_data`` is stored in the metadata (provenance: hashes of program and YAML file, version). ``keeps_pace``
+    returns whether the caller follows a clock and must not wait for the compression of a chunk, however small.
 
-    To begin a further file the caller asks ``split_due`` between two instants (or has reasons of its own), calls
+    To begin a further file, the caller checks ``split_due`` between two instants (or has other reasons), calls
     ``split`` and repeats the facts without which that file could not be read alone.
 
     Raises:
@@ -100,17 +100,17 @@ class BagWriter:
         self._attachments: list[Attachment] = []
         self._files: list[FileSummary] = []
         self._own_text = ""
-        """What the last file tells of itself."""
+        """The metadata that the last file contains of itself."""
         self._counts_before: dict[str, int] = {}
         self._last_time = -1
         self._stamp: int | None = None
-        """Time of the message before; None when the next one has to be looked at closely."""
+        """Time of the previous message; None if the next one must be checked."""
         self._chunk_end = 0
         self._open = True
         self._chunks = ChunkThread()
         self._sync_error: OSError | None = None
         self._finished: list[Path] = []
-        """Files, and the folder with their names, that ``sync`` has not yet seen to the disk."""
+        """Files, and the folder with their names, that ``sync`` has not written to the disk yet."""
         try:
             folder.mkdir(parents=True)
             self._begin_file()
@@ -129,10 +129,10 @@ class BagWriter:
         self.close()
 
     def channel(self, topic: str, type_name: str, qos: QosProfile) -> Channel:
-        """Return the channel of a topic; the first call for a topic makes it.
+        """Return the channel of a topic; the first call for a topic creates it.
 
         Raises:
-            RecordingError: the topic is not a ROS name or has another type already, or recordings do not know the type.
+            RecordingError: the topic is not a ROS name or has another type already, or the type is unknown.
         """
         channel = self._channels.get(topic)
         if channel is not None:
@@ -157,10 +157,10 @@ class BagWriter:
     def write(self, channel: Channel, stamp: int, payload: bytes) -> None:
         """Add a message (CDR bytes) at a time in nanoseconds; messages of one time belong to one instant.
 
-        Its log time is the stamp, or one nanosecond after the message before if that is later: log times increase.
+        Its log time is the stamp, or one nanosecond after the previous message if that is later: log times increase.
 
         Raises:
-            RecordingError: time or length out of range, writer closed, or the disk refuses.
+            RecordingError: time or length out of range, writer closed, or the disk cannot be written.
         """
         if stamp != self._stamp:
             self._begin_instant(channel, stamp, payload)
@@ -177,10 +177,10 @@ class BagWriter:
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Store a file that belongs to the recording, such as the rack's YAML or a task's source; in each data file.
 
-        One of the same name takes the place of the former in the data files to come.
+        It replaces a former one of the same name in later data files.
 
         Raises:
-            RecordingError: it is too long, the writer is closed, or the disk refuses.
+            RecordingError: the file is too long, the writer is closed, or the disk cannot be written.
         """
         if not self._open or len(data) > MAX_PAYLOAD_BYTES:
             raise self._refusal(
@@ -198,14 +198,14 @@ class BagWriter:
 
     @property
     def split_due(self) -> bool:
-        """Whether the file has reached the size at which another one begins; the open chunk does not count."""
+        """Whether the file has reached the size at which the next one begins; the open chunk does not count."""
         return 0 < self._options.split_bytes <= self._file.tell()
 
     def split(self) -> None:
         """Finish the file and begin the next one, with the same attachments and channels; between two instants only.
 
         Raises:
-            RecordingError: the writer is closed, or the disk refuses.
+            RecordingError: the writer is closed, or the disk cannot be written.
         """
         if not self._open:
             raise self._refusal("a new file after the recording was closed")
@@ -216,20 +216,20 @@ class BagWriter:
             raise self._failed(error) from error
 
     def flush(self, now: int | None = None) -> None:
-        """Hand the open chunk to the operating system; with a time only if the chunk's own time is over by then.
+        """Hand the open chunk to the operating system; with a time, only if the chunk's own time has passed by then.
 
-        Without a time it has it when this returns, else soon, and what the disk refuses the next call tells.
+        Without a time this is done on return, else soon after, and the next call raises an error of the disk.
 
         Raises:
-            RecordingError: the disk refuses.
+            RecordingError: the disk cannot be written.
         """
         if self._open and (now is None or now >= self._chunk_end or self._chunks.failed):
             self._flush(wait=now is None)
 
     def sync(self) -> None:
-        """Wait until what was flushed is on the disk itself; from another thread too, for it may take long.
+        """Wait until flushed data are on the disk; may be called from another thread, since it may take long.
 
-        When the disk refuses, the next ``write``, ``close`` or ``require_synced`` tells.
+        An error of the disk is raised by the next ``write``, ``close`` or ``require_synced``.
         """
         try:
             self._chunks.settle()
@@ -240,19 +240,19 @@ class BagWriter:
             self._sync_error = error
 
     def require_synced(self) -> None:
-        """Tell whether the disk has refused a ``sync``.
+        """Check that no ``sync`` has failed.
 
         Raises:
-            RecordingError: it has.
+            RecordingError: a ``sync`` has failed.
         """
         if self._sync_error is not None:
             raise self._failed(self._sync_error)
 
     def close(self) -> None:
-        """Finish the files. After a failed write only what stands on disk is kept.
+        """Finish the files. After a failed write only data already on the disk are kept.
 
         Raises:
-            RecordingError: the disk refuses, or has refused a ``sync``; the files are finished nevertheless.
+            RecordingError: the disk cannot be written, or a ``sync`` failed; in that case the files are finished.
         """
         if not self._open:
             return
@@ -284,7 +284,7 @@ class BagWriter:
             self._define(definition)
 
     def _finish_file(self) -> None:
-        """Write what is after the messages of a file: description, index, summary."""
+        """Write the parts after the messages of a file: description, index, summary."""
         self._end_chunk(wait=True)
         statistics = self._mcap.statistics
         start, end = statistics.message_start_time, statistics.message_end_time
@@ -297,7 +297,7 @@ class BagWriter:
         self._finished.append(self._file.path)
 
     def _define(self, record: Schema | ChannelRecord) -> None:
-        """Put a schema or channel into the open chunk, so that it stands before the first message that needs it."""
+        """Add a schema or channel to the open chunk, so that it precedes the first message that needs it."""
         self._definitions.append(record)
         if isinstance(record, Schema):
             self._mcap.schemas[record.id] = record
@@ -306,7 +306,7 @@ class BagWriter:
         self._chunk.add_record(record)
 
     def _begin_instant(self, channel: Channel, stamp: int, payload: bytes) -> None:
-        """End the chunk before a message at another time than the one before, if its time is over or it is full."""
+        """Begin an instant with a message at a new time; end the chunk first if its time has passed or it is full."""
         if not self._open or not 0 <= stamp <= MAX_STAMP:
             raise self._bad_message(channel, stamp, payload)
         if self._sync_error is not None:
@@ -320,7 +320,7 @@ class BagWriter:
         self._stamp = stamp
 
     def _relieved_chunk(self, channel: Channel, stamp: int, payload: bytes) -> ChunkBuilder:
-        """Return an empty chunk for a long message, if it is not too long."""
+        """Return an empty chunk for a long message; refuse one that is too long."""
         if len(payload) > MAX_PAYLOAD_BYTES:
             raise self._bad_message(channel, stamp, payload)
         self.flush()
@@ -333,7 +333,7 @@ class BagWriter:
             raise self._failed(error) from error
 
     def _end_chunk(self, *, wait: bool) -> None:
-        """Let the open chunk be written; ``wait`` until it is: then the file may be asked for its size, or written."""
+        """Write the open chunk; ``wait`` until that is done if the file's size is needed next, or the file itself."""
         chunk = self._chunk
         if chunk.has_messages:
             if chunk.size <= AT_ONCE_BYTES and not self._keeps_pace():
@@ -346,7 +346,7 @@ class BagWriter:
             self._chunks.settle()
 
     def _metadata(self, files: list[FileSummary]) -> BagMetadata:
-        """Describe the whole recording, or its last file alone."""
+        """Return the metadata of the whole recording, or of its last file alone."""
         before = self._counts_before if len(files) < len(self._files) else {}
         counts = {item: item.message_count - before.get(item.topic, 0) for item in self._channels.values()}
         kinds = message_types()

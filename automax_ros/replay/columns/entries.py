@@ -1,4 +1,4 @@
-"""Values of common variables in many messages, one after the other in plain arrays."""
+"""Values of common variables in many messages, concatenated in plain arrays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Entries:
-    """Message k has the entries from ``offsets[k]`` up to ``offsets[k + 1]``."""
+    """Entries of messages: message k has those from ``offsets[k]`` to before ``offsets[k + 1]``."""
 
     offsets: Ints
     views: Ints
@@ -30,7 +30,7 @@ class Entries:
 
     @property
     def counts(self) -> Ints:
-        """How many entries each message has."""
+        """The number of entries of each message."""
         return np.diff(self.offsets)
 
     @property
@@ -39,7 +39,7 @@ class Entries:
         return np.repeat(np.arange(len(self)), self.counts)
 
     def part(self, begin: int, end: int) -> Entries:
-        """Return the entries of the messages from ``begin`` up to ``end``."""
+        """Return the entries of the messages from ``begin`` to before ``end``."""
         offsets = self.offsets[begin : end + 1]
         first, last = int(offsets[0]), int(offsets[-1])
         return Entries(offsets - first, self.views[first:last], self.elements[first:last], self.values[first:last])
@@ -55,14 +55,14 @@ class Entries:
 
 
 def chosen(offsets: Ints, rows: Ints) -> tuple[Ints, Ints]:
-    """Return for some of the rows of a ragged list their own offsets, and the places of what they hold."""
+    """Return the offsets of some rows of a ragged list, and the places of their items."""
     counts = offsets[rows + 1] - offsets[rows]
     own = np.concatenate((np.zeros(1, np.int64), np.cumsum(counts)))
     return own, np.repeat(offsets[rows] - own[:-1], counts) + np.arange(int(own[-1]))
 
 
 class EntriesBuilder:
-    """Gathers the entries of ``count`` messages in any order; ``bad`` are those whose lists do not fit together."""
+    """Collects the entries of ``count`` messages in any order; ``bad`` are those whose lists are inconsistent."""
 
     def __init__(self, count: int) -> None:
         self._counts = np.zeros(count, np.int64)
@@ -70,7 +70,7 @@ class EntriesBuilder:
         self.bad = np.zeros(count, bool)
 
     def add(self, columns: MessageColumns, prefix: str) -> None:
-        """Take one field of messages of the same sizes."""
+        """Add one field of messages of the same sizes."""
         views, elements, values = (columns.fields[f"{prefix}.{name}"] for name in ("variable", "element", "value"))
         if not views.shape[1] == elements.shape[1] == values.shape[1]:
             self.bad[columns.rows] = True
@@ -80,7 +80,7 @@ class EntriesBuilder:
             self._parts.append((columns.rows, views, elements, values))
 
     def add_one(self, row: int, values: Values) -> None:
-        """Take one field of one message."""
+        """Add one field of one message."""
         if values.text or not len(values.variable) == len(values.element) == len(values.value):
             self.bad[row] = True
         elif values.variable:
@@ -99,7 +99,7 @@ class EntriesBuilder:
 
 
 def put(begins: Ints, columns: Sequence[Array], kept: Sequence[Array]) -> None:
-    """Put each row of some matrices where it begins, along their shorter side: messages may be few and long."""
+    """Copy each row of some matrices to its begin, looping over their shorter side: messages may be few and long."""
     count, width = columns[0].shape
     if width <= count:
         for place in range(width):
@@ -113,15 +113,15 @@ def put(begins: Ints, columns: Sequence[Array], kept: Sequence[Array]) -> None:
 
 
 class ValueRules:
-    """What values the variables of a rack can have, by their numbers; strings have none here.
+    """The possible values of a rack's ``count`` variables, by number; strings have none here.
 
-    ``count`` variables: how many ``elements`` each has, its ``least`` and ``greatest`` value, whether it is a ``real``.
+    Each has a number of ``elements``, a ``least`` and a ``greatest`` value, and may be a ``real``.
     """
 
     def __init__(self, variables: Sequence[CommonVariable]) -> None:
         count = len(variables)
         self.count = count
-        # The last item of each is that of variables which the rack does not have: no value fits it.
+        # The last item of each is for variables that the rack does not have: no value fits it.
         self.real = np.array([*(item.type is DataType.REAL for item in variables), False], bool)
         self.elements = np.array([*(item.elements for item in variables), 0], np.int64)
         ranges = [*(item.type.range if item.type is not DataType.STRING else (1, 0) for item in variables), (1, 0)]
@@ -129,7 +129,7 @@ class ValueRules:
         self.greatest = np.array([high for _, high in ranges], np.float64)
 
     def wrong(self, entries: Entries) -> Ints:
-        """Return the messages that have a value that its variable cannot have, ascending."""
+        """Return the messages with a value that its variable cannot have, ascending."""
         if not len(entries.views):
             return np.zeros(0, np.int64)
         views = np.minimum(entries.views, self.count)
@@ -145,7 +145,7 @@ class ValueRules:
         return np.unique(entries.rows[~fits])
 
     def typed(self, entries: Entries) -> Entries:
-        """Return entries as their variables hold them: whole numbers have no negative zero."""
+        """Return entries in the types of their variables: whole numbers have no negative zero."""
         if not len(entries.views):
             return entries
         views = np.minimum(entries.views, self.count)
@@ -154,9 +154,9 @@ class ValueRules:
 
 
 def first_other(recorded: Entries, own: Entries, *, bits: bool) -> int:
-    """Return the first message whose entries are not the same in both, or how many messages there are.
+    """Return the first message whose entries differ, or the number of messages.
 
-    With ``bits`` values are the same to the last bit, and elements count too.
+    With ``bits`` values are compared bit for bit, and elements count, too.
     """
     count = min(len(recorded), len(own))
     if not len(recorded.views) and not len(own.views):

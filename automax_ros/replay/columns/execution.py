@@ -1,7 +1,7 @@
-"""Executes many scans of a task on columns of what they latched and read, and gives columns of what they did.
+"""Executes many scans of a task on columns of their latched and read values, and returns columns of the results.
 
-``PythonColumns`` calls the compiled Python function scan by scan: it is what runs where nothing quicker can be had, and
-the model of it.
+``PythonColumns`` calls the compiled Python function scan by scan: it runs where nothing faster is available, and is the
+model for faster forms.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from automax_ros.runtime.scan.task_io import register_read, register_written
 
 @dataclass(frozen=True)
 class Executed:
-    """What scans did. Fewer may be ``done`` than were asked for: the next one has to be executed by itself.
+    """The results of scans. Fewer may be ``done`` than requested: then the next one must be executed separately.
 
-    ``outputs`` has for each of ``CompiledTask.written`` its values at END; ``errors`` has rows of scan (from 0), line
-    and code; ``written`` is what BASIC statements wrote.
+    ``outputs`` has the values at END of each of ``CompiledTask.written``; ``errors`` has rows of scan (from 0), line
+    and code; ``written`` are the writes of BASIC statements.
     """
 
     done: int
@@ -41,18 +41,19 @@ class ColumnForm(Protocol):
     def columns(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> Executed:
         """Execute ``count`` scans.
 
-        They get what each of ``CompiledTask.latched`` was, and what BASIC statements read in ``read``, in that order.
+        ``latched`` are the values of each of ``CompiledTask.latched``, ``read`` those that BASIC statements read, in
+        order.
         """
         ...
 
 
 class PythonColumns:
-    """The compiled Python function on columns; ``types`` are those of the rack's variables, by their views."""
+    """Executes the compiled Python function on columns; ``types`` are those of the rack's variables, by view."""
 
     def __init__(
         self, compiled: CompiledTask, views: Sequence[int], types: Sequence[DataType], backplane: Backplane
     ) -> None:
-        """Take a task; ``views`` are those of ``compiled.latched``."""
+        """Create the form of a task; ``views`` are those of ``compiled.latched``."""
         self._compiled, self._types, self._backplane = compiled, types, backplane
         self._views = tuple(views)
         self._flags = [type_of_name(name) is DataType.BOOLEAN for name in compiled.latched]
@@ -64,7 +65,7 @@ class PythonColumns:
         before = _copied(state)
         io = self._execute(state, latched, count, read)
         if io.done < count:
-            # The scan that could not be executed has changed the state: execute those before it again.
+            # The scan that could not be executed has changed the state: execute the scans before it again.
             state[:] = before
             io = self._execute(state, latched, io.done, read)
         return self._executed(io, latched)
@@ -105,11 +106,11 @@ class PythonColumns:
 
 
 class _Elsewhere(Exception):
-    """A scan does what columns do not tell."""
+    """A scan does something that columns cannot represent."""
 
 
 class _ColumnIo:
-    """What the scans touch: ``done`` of them are executed whole."""
+    """The inputs and outputs of the scans, of which ``done`` are complete."""
 
     def __init__(self, rows: list[Latched], read: Entries, types: Sequence[DataType], backplane: Backplane) -> None:
         self._rows = iter(rows)
@@ -137,11 +138,11 @@ class _ColumnIo:
 
     @property
     def read_all(self) -> bool:
-        """Whether the scan has read all that the recorded one read."""
+        """Whether the scan has made all reads of the recorded one."""
         return self._place == self._end
 
     def written(self, done: int) -> Entries:
-        """Return what the first scans wrote."""
+        """Return the writes of the first ``done`` scans."""
         offsets = np.array(self._write_offsets[: done + 1] if done else [0], np.int64)
         writes = self._writes[: int(offsets[-1])]
         return Entries(
@@ -154,19 +155,19 @@ class _ColumnIo:
     # ScanIo
 
     def latch(self) -> Latched:
-        """Return what the scan latches."""
+        """Return the latched values of the scan."""
         return next(self._rows)
 
     def forces(self) -> tuple[bool, ...]:
-        """Nothing is forced on this path."""
+        """Leave the scan to scan-by-scan replay: nothing is forced here."""
         raise _Elsewhere
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
-        """Note what blocks changed."""
+        """Record the changes by blocks."""
         self.commits.append((self._scan, changes))
 
     def read_now(self, view: int, element: int = 0) -> Value:
-        """Return what the recorded scan read at this place."""
+        """Return the value that the recorded scan read at this place."""
         place = self._place
         if place == self._end or self._places[place] != (view, element):
             raise _Elsewhere
@@ -174,29 +175,29 @@ class _ColumnIo:
         return self._values[place]
 
     def write_now(self, view: int, value: Value, element: int = 0) -> None:
-        """Note what a BASIC statement writes."""
+        """Record the write of a BASIC statement."""
         if isinstance(value, str) or isinstance(value, float) is not (self._types[view] is DataType.REAL):
             raise _Elsewhere
         self._writes.append((view, element, value))
 
     def log(self, line: int, code: int) -> None:
-        """Note a run-time error."""
+        """Record a run-time error."""
         self.errors.append((self._scan, line, code))
 
     def print_line(self, values: tuple[Value, ...], separators: str) -> None:  # noqa: ARG002
-        """Leave the scan to the path scan by scan."""
+        """Leave the scan to scan-by-scan replay."""
         raise _Elsewhere
 
     def errors_logged(self) -> bool:
-        """Leave the scan to the path scan by scan."""
+        """Leave the scan to scan-by-scan replay."""
         raise _Elsewhere
 
     def clear_errors(self) -> None:
-        """Leave the scan to the path scan by scan."""
+        """Leave the scan to scan-by-scan replay."""
         raise _Elsewhere
 
     def set_event(self, name: str) -> None:  # noqa: ARG002
-        """Leave the scan to the path scan by scan."""
+        """Leave the scan to scan-by-scan replay."""
         raise _Elsewhere
 
     def io_read(self, slot: int, register: int) -> tuple[int, int]:
@@ -208,7 +209,7 @@ class _ColumnIo:
         return register_written(self._backplane, self.write_now, slot, register, value)
 
     def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG002
-        """Leave the scan to the path scan by scan."""
+        """Leave the scan to scan-by-scan replay."""
         raise _Elsewhere
 
 

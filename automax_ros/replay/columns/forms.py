@@ -1,4 +1,4 @@
-"""How tasks are executed on columns: as machine code where that is wanted and can be had, else in Python."""
+"""The forms in which tasks are executed on columns: machine code where it is wanted and available, else Python."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 WORTHWHILE_NS = 600 * NS_PER_S
 """Recorded time from which on the library of a replay by columns is built or looked for (decision).
 
-It takes half a second once on a machine, and saves a millisecond for each second of five tasks at 5.5 ms.
+Building it takes half a second once on a machine, and saves a millisecond for each second of five tasks at 5.5 ms.
 """
 
 
 class ColumnForms:
-    """Makes the forms of the tasks of one recording, each once."""
+    """Creates the forms of the tasks of one recording, each once."""
 
     def __init__(
         self, variables: Sequence[CommonVariable], backplane: Backplane, native: NativeForms = IN_PYTHON
@@ -47,12 +47,12 @@ class ColumnForms:
 
     @property
     def outcomes(self) -> list[NativeOutcome]:
-        """What became of the tasks."""
+        """Whether each task is native, or why not."""
         return list(self._made.values())
 
     @property
     def library(self) -> ColumnLibrary | None:
-        """What does the rest of a replay by columns as machine code; None where NumPy does it."""
+        """The machine code for the rest of a replay by columns; None where NumPy is used."""
         if not self._sought:
             self._sought = True
             path = self._native.library(library_text(), WORTHWHILE_NS)
@@ -65,14 +65,14 @@ class ColumnForms:
         """Return the form of a task that latches these views."""
         outcome = self._made.get(id(compiled))
         if outcome is None:
-            outcome = self._made[id(compiled)] = self._native.form(compiled)  # it keeps the task, so the id stays
+            outcome = self._made[id(compiled)] = self._native.form(compiled)  # keeps the task, so the id stays valid
         if outcome.native is not None:
             return NativeColumns(outcome.native)
         return PythonColumns(compiled, views, self._types, self._backplane)
 
 
 class NativeColumns:
-    """A native task on columns."""
+    """Executes a native task on columns."""
 
     def __init__(self, task: NativeTask) -> None:
         self._task = task

@@ -1,6 +1,6 @@
-"""What a replay by columns does as machine code: ``columns.c``, built once and kept in the cache of native code.
+"""Machine code for replay by columns: ``columns.c``, built once and kept in the cache of native code.
 
-What it does NumPy does, too: where it is not wanted, does not pay or cannot be built, nothing but time is lost.
+NumPy can do the same: where the library is not wanted, does not pay or cannot be built, replay is only slower.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from automax_ros.replay.columns.entries import Entries, ValueRules
 _MOST_DEFINITIONS = 1000
 _MOST_FIELDS = 32
 _LEAST_ENTRY = 4
-"""Bytes that an entry takes at least in a message."""
+"""Fewest bytes of an entry in a message."""
 _ENTRY = np.dtype([("value", "<f8"), ("element", "<u4"), ("view", "<u2"), ("unused", "<u2")])
 _TEXT = (Path(__file__).parent / "columns.c").read_text(encoding="utf-8")
 _MALFORMED, _FITS, _HAS_TEXTS = range(3)
@@ -34,7 +34,7 @@ _MALFORMED, _FITS, _HAS_TEXTS = range(3)
 
 @dataclass(frozen=True)
 class TakenKind:
-    """What is taken of the messages of a type, by the names of fields; ``pairs`` and ``text`` may be empty."""
+    """The fields that are read from messages of a type, by name; ``pairs`` and ``text`` may be empty."""
 
     type_name: str
     numbers: tuple[str, ...]
@@ -59,13 +59,13 @@ def _source(kind: TakenKind) -> FieldsSource:
 
 
 def library_text() -> str:
-    """Return the C text."""
+    """Return the C source of the library."""
     functions = [_source(kind).text for kind in (SCANS, WRITES)]
     return "\n".join((f"#define MAX_TRAILING {MAX_TRAILING}", MACROS, *functions, _TEXT))
 
 
 class _Address(ctypes.c_void_p):
-    """Where an array stands. It holds the array, or memory that was given back would be read in the call."""
+    """The address of an array. It keeps a reference to the array, so that the memory is not freed before the call."""
 
     array: NDArray[Any]
 
@@ -98,11 +98,11 @@ class _Rules(ctypes.Structure):
 
 @dataclass(frozen=True)
 class TakenMessages:
-    """What was taken of messages: numbers by name (those of uint64 as the same bits), and their entries.
+    """The fields read from messages: numbers by name (those of uint64 as the same bits), and their entries.
 
-    ``named`` is the place of each message's text among those that were given, -1 for others. ``odd`` are those that are
-    malformed, or whose entries are not what the variables can have; ``with_texts`` have texts in a sequence.
-    ``malformed`` are those that do not fit, or that only the scalar decoder can judge, ascending.
+    ``named`` is the index of each message's text among the given ones, -1 for others. ``odd`` are those that are
+    malformed, or have entries that the variables cannot have; ``with_texts`` have texts in a sequence. ``malformed``
+    are those that do not fit, or that only the scalar decoder can check, ascending.
     """
 
     numbers: dict[str, Ints]
@@ -130,7 +130,7 @@ class ColumnLibrary:
         self._definitions = np.empty(_MOST_DEFINITIONS, np.int64)
 
     def table(self, data: Buffer, ends: Sequence[int]) -> ChunkTable | None:
-        """Return where the messages of chunks stand, each up to one of the ends; None where a record is another one."""
+        """Return the table of the messages of chunks, which have these ends; None if there is an unexpected record."""
         if not 0 <= min(ends) <= max(ends) == len(data):
             raise ValueError("chunks that do not end with their bytes")
         if self._columns.shape[1] < min(len(data) // MESSAGE_HEAD, MOST_MESSAGES):
@@ -153,7 +153,7 @@ class ColumnLibrary:
     def taken(
         self, kind: TakenKind, data: Bytes, starts: Ints, lengths: Ints, rules: ValueRules, texts: Sequence[str] = ()
     ) -> TakenMessages:
-        """Take messages of a kind, which begin at ``starts`` of ``data`` and have ``lengths`` bytes."""
+        """Read messages of a kind, which begin at ``starts`` in ``data`` and have ``lengths`` bytes."""
         count, lists = len(starts), len(kind.groups) + 1
         room = int(lengths.sum()) // _LEAST_ENTRY
         fits, odd = np.empty(count, np.uint8), np.empty(count, np.uint8)
@@ -188,7 +188,7 @@ class ColumnLibrary:
         )
 
     def picked(self, taken: TakenMessages, rows: Ints) -> list[Entries]:
-        """Return the entries of some messages, list by list; those of pairs have the two numbers, and values of 0."""
+        """Return the entries of some messages, list by list; pairs are entries of two numbers with values of 0."""
         lists, count = taken.lists, len(rows)
         offsets = np.empty((lists, count + 1), np.int64)
         common = (
@@ -207,7 +207,7 @@ class ColumnLibrary:
         return [Entries(*columns) for columns in zip(offsets, views, elements, values, strict=True)]
 
     def latched(self, entries: Entries, positions: Ints, before: Sequence[int]) -> Ints:
-        """Return a row for each of the latched views, ``before`` them all: see ``LatchedColumns.columns``."""
+        """Return a row for each latched view; ``before`` are the values before (``LatchedColumns.columns``)."""
         count, width = len(entries), len(before)
         now, since = np.array(before, np.int64), np.zeros(width, np.int64)
         columns = np.empty((width, count), np.int64)
@@ -220,7 +220,7 @@ class ColumnLibrary:
         return columns
 
     def same_commits(self, recorded: Entries, outputs: Sequence[Ints], latched: Sequence[Ints], views: Ints) -> int:
-        """Return how many scans committed what was recorded; the columns are those of the written ``views``."""
+        """Return how many scans made the recorded commits; the columns are those of the written ``views``."""
         columns = [[np.ascontiguousarray(column, np.int64) for column in group] for group in (outputs, latched)]
         count = self._count(
             "automax_same_commits",
@@ -231,7 +231,7 @@ class ColumnLibrary:
         return int(count)
 
     def _kind(self, kind: TakenKind) -> tuple[_Kind, tuple[Ints, Ints]]:
-        """Return the argument that says what to take, and what it must not outlive."""
+        """Return the argument for the fields to read, and the arrays that must outlive it."""
         source = _source(kind)
         number = np.array([source.numbers.index(name) for name in kind.numbers], np.int64)
         group = np.array([source.lists.index(f"{name}.variable") for name in kind.groups], np.int64)
@@ -268,9 +268,9 @@ def _rules(rules: ValueRules) -> _Rules:
 
 
 def _address(array: NDArray[Any], kind: Any) -> ctypes.c_void_p:
-    """Return where an array stands that C reads or fills; it lives as long as what is returned does.
+    """Return the address of an array for C; the array lives at least as long as the address.
 
-    TypeError if it is not as C expects it.
+    TypeError if its type or layout is not the one that C expects.
     """
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"{array.dtype} where {np.dtype(kind)} stands in one piece")

@@ -1,4 +1,4 @@
-"""The scans and writes of a block as columns, found by machine code: what ``scans`` and ``writes`` do with NumPy."""
+"""The scans and writes of a block as columns, found by machine code; ``columns/scans`` does the same with NumPy."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _UINT64 = (1 << 64) - 1
 def native_scans(
     library: ColumnLibrary, block: MessageBlock, places: Ints, tasks: Sequence[str], rules: ValueRules
 ) -> tuple[dict[str, ScanColumns], Ints]:
-    """Return the scans of each task and the places of no task's, as ``scans_by_task`` does."""
+    """Return the scans of each task, and the places of scans of no task, as ``scans_by_task`` does."""
     taken = library.taken(SCANS, block.data, block.starts[places], block.lengths[places], rules, tasks)
     named, odd = taken.named, taken.odd | taken.with_texts | (taken.numbers["scan"] < 0)
     for row in taken.malformed.tolist():
@@ -58,7 +58,7 @@ def _scans(
 def native_writes(
     library: ColumnLibrary, block: MessageBlock, places: Ints, run_id: int, rules: ValueRules
 ) -> tuple[WriteColumns, Ints]:
-    """Return the writes, and at which of them a force begins or ends, as ``write_columns`` does."""
+    """Return the writes, and the places of those by which a force begins or ends, as ``write_columns`` does."""
     taken = library.taken(WRITES, block.data, block.starts[places], block.lengths[places], rules)
     entries = library.picked(taken, np.arange(len(places)))[0]
     sequences, kinds, runs = taken.numbers.values()
@@ -75,7 +75,7 @@ def native_writes(
 
 
 def _task_of(block: MessageBlock, place: int) -> str | None:
-    """Return the task of a scan that only the scalar decoder can judge; None if it is malformed."""
+    """Return the task of a scan that only the scalar decoder can check; None if it is malformed."""
     try:
         message = block.message(place).message
     except BagError:

@@ -1,7 +1,4 @@
-"""The scans of the tasks in a block of a recording, as columns.
-
-The writes to common memory in a block of a recording, as columns.
-"""
+"""The scans of the tasks, and the writes to common memory, in a block of a recording, as columns."""
 
 from __future__ import annotations
 
@@ -24,19 +21,19 @@ SCAN = NAMES[Scan]
 _FIELDS = ("latched", "read", "written", "committed")
 _NUMBERS = ("stamp", "scan", "duration_ns")
 _HEAD = np.dtype([("skipped", "V16"), ("size", "<u4"), ("name", "V12")])
-"""The beginning of a Scan: header, stamp and slot, then the name of its task with the length of that."""
+"""Beginning of a Scan: header, stamp and slot, then the length and the name of its task."""
 
 
 @dataclass(frozen=True)
 class ScanErrors:
-    """The run-time errors of scans: scan k has those from ``offsets[k]`` up to ``offsets[k + 1]``."""
+    """The run-time errors of scans: scan k has those from ``offsets[k]`` to before ``offsets[k + 1]``."""
 
     offsets: Ints
     lines: Ints
     codes: Ints
 
     def part(self, begin: int, end: int) -> ScanErrors:
-        """Return the errors of the scans from ``begin`` up to ``end``."""
+        """Return the errors of the scans from ``begin`` to before ``end``."""
         offsets = self.offsets[begin : end + 1]
         first, last = int(offsets[0]), int(offsets[-1])
         return ScanErrors(offsets - first, self.lines[first:last], self.codes[first:last])
@@ -51,8 +48,8 @@ class ScanErrors:
 class ScanColumns:
     """Scans in the order of the file; ``places`` are those of their messages in the block.
 
-    ``odd`` are those that have to be taken one by one: malformed, not fitting the variables of the rack, with strings
-    or with what came from elsewhere than common memory, or telling of a fault by time.
+    ``odd`` are those that must be replayed one by one: malformed, not fitting the variables of the rack, with strings
+    or with inputs from outside of common memory, or with a fault for their time.
     """
 
     places: Ints
@@ -71,7 +68,7 @@ class ScanColumns:
         return len(self.places)
 
     def part(self, begin: int, end: int) -> ScanColumns:
-        """Return the scans from ``begin`` up to ``end``."""
+        """Return the scans from ``begin`` to before ``end``."""
         return ScanColumns(
             self.places[begin:end],
             self.stamps[begin:end],
@@ -108,15 +105,15 @@ def scans_by_task(
 ) -> tuple[dict[str, ScanColumns], Ints]:
     """Decode the scans at these places of a block, by the names of their tasks.
 
-    Returns too which of the places hold no scan of these tasks, as far as can be told; the first malformed one is
-    among them, whoever it names.
+    Also returns the places without a scan of these tasks, as far as is known; the first malformed one is among them,
+    whichever task it names.
     """
     names = _Names(block, places)
     chosen_rows = {task: np.flatnonzero(names.of(task)) for task in tasks}
     left = np.ones(len(places), bool)
     for rows in chosen_rows.values():
         left[rows] = False
-    # Scans of all tasks are decoded together: those of the same sizes are more so.
+    # Scans of all tasks are decoded together: so there are more of the same sizes.
     builder = _Builder(block, places)
     together = builder.made(rules)
     if builder.malformed is not None:
@@ -125,13 +122,13 @@ def scans_by_task(
 
 
 def tell_of_time(errors: ScanErrors) -> Ints:
-    """Return the scans that tell of a fault by time, which no execution of a source does."""
+    """Return the scans with a fault for their time, which no execution of a source can show."""
     timed = np.flatnonzero(np.isin(errors.codes, (OVERLAP, EVENT_TIMEOUT)))
     return np.searchsorted(errors.offsets, timed, side="right") - 1
 
 
 class _Names:
-    """The names of the tasks in scans, read from their beginnings."""
+    """The names of the tasks of scans, read from the beginnings of the messages."""
 
     def __init__(self, block: MessageBlock, places: Ints) -> None:
         self._long = block.lengths[places] >= _HEAD.itemsize
@@ -153,7 +150,7 @@ class _Names:
 
 
 class _Builder:
-    """Builds columns from messages of the same sizes, and of others one by one."""
+    """Builds columns from groups of messages of the same sizes, and from all others one by one."""
 
     def __init__(self, block: MessageBlock, places: Ints) -> None:
         self.places = places
@@ -199,7 +196,7 @@ class _Builder:
         self._add_errors(rows, fields["errors.line"], fields["errors.code"])
 
     def _add_one(self, block: MessageBlock, row: int) -> bool:
-        """Take one message; return FALSE if it is malformed."""
+        """Add one message; return FALSE if it is malformed."""
         try:
             scan = block.message(int(self.places[row])).message
         except BagError:
@@ -240,8 +237,8 @@ FORCING = (int(WriteKind.FORCE), int(WriteKind.RELEASE))
 class WriteColumns:
     """Writes in the order of the file; ``places`` are those of their messages in the block.
 
-    ``good`` are those that may be taken together: the others have to be taken one by one, since they are malformed, of
-    another run, do not fit the variables of the rack, hold strings or do not follow on the write before.
+    ``good`` are those that may be applied together; the others must be applied one by one, since they are malformed or
+    of another run, do not fit the variables of the rack, contain strings or do not follow the previous write.
     """
 
     places: Ints
@@ -250,24 +247,24 @@ class WriteColumns:
     good: NDArray[np.bool_]
 
     def between(self, begin: int, end: int) -> WriteColumns:
-        """Return the writes whose places are from ``begin`` up to ``end``."""
+        """Return the writes whose places are from ``begin`` to before ``end``."""
         first, last = np.searchsorted(self.places, (begin, end)).tolist()
         return self.part(first, last)
 
     def part(self, begin: int, end: int) -> WriteColumns:
-        """Return the writes from ``begin`` up to ``end``."""
+        """Return the writes from ``begin`` to before ``end``."""
         entries = self.entries.part(begin, end)
         return WriteColumns(self.places[begin:end], self.sequences[begin:end], entries, self.good[begin:end])
 
     def runs(self) -> Iterator[WriteColumns]:
-        """Return the writes in stretches that are all good or all not."""
+        """Yield the writes in stretches that are all good or all not good."""
         ends = np.flatnonzero(self.good[1:] != self.good[:-1]) + 1
         bounds = [0, *ends.tolist(), len(self.places)]
         yield from (self.part(begin, end) for begin, end in pairwise(bounds) if end > begin)
 
 
 def write_columns(block: MessageBlock, places: Ints, run_id: int, rules: ValueRules) -> tuple[WriteColumns, Ints]:
-    """Decode the writes at these places of a block; return too at which of them a force begins or ends."""
+    """Decode the writes at these places of a block; also return the places at which a force begins or ends."""
     count = len(places)
     sequences, kinds = np.zeros(count, np.int64), np.zeros(count, np.int64)
     builder = EntriesBuilder(count)
@@ -295,7 +292,7 @@ def write_columns(block: MessageBlock, places: Ints, run_id: int, rules: ValueRu
 
 
 def decoded_write(block: MessageBlock, place: int) -> CommonWrite | None:
-    """Return a write, decoded by itself; None if it is malformed."""
+    """Return a write, decoded alone; None if it is malformed."""
     try:
         message = block.message(place).message
     except BagError:

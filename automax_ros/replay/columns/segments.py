@@ -1,4 +1,4 @@
-"""Takes a recording block by block: what is uniform by columns, the rest message by message, in the recorded order."""
+"""Replays a recording block by block: uniform scans by columns, the rest message by message, in the recorded order."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from automax_ros.replay.scans.commons import RecordedCommons
 from automax_ros.replay.scans.task import TaskReplay
 
 FEWEST_MESSAGES = 64
-"""Between two messages that have to be taken by themselves, fewer than this go one by one too (decision)."""
+"""Between two messages that must be processed separately, fewer than this are processed one by one, too (decision)."""
 FEWEST_WRITES = 8
-"""Fewer writes than this go one by one (decision)."""
+"""Fewer writes than this are applied one by one (decision)."""
 
 
 class BlockReplay:
-    """Takes blocks of one recording for its tasks; ``take`` takes one message and says whether more are of interest.
+    """Replays blocks of one recording; ``take`` processes one message and returns whether more are of interest.
 
-    In each stretch the last scan of every task goes by itself, so that all that is kept of a scan is as always.
+    In each stretch the last scan of every task is executed separately, so that the state kept of it is complete.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class BlockReplay:
     ) -> None:
         """Prepare for scans of the tasks of these names; only the given ``tasks`` are executed, in these ``forms``.
 
-        ``span``: scans are counted from this stamp on, and of interest up to that one.
+        ``span``: scans are counted from its first stamp on, and are of interest up to its second one.
         """
         self._tasks, self._names, self._commons, self._take = tasks, sorted(names), commons, take
         self._begin, self._end = span
@@ -49,15 +49,15 @@ class BlockReplay:
         self._stretches = {name: TaskStretches(task, commons, self._rules, forms) for name, task in tasks.items()}
         self._library = forms.library
         self.table_of = None if self._library is None else self._library.table
-        """What finds the messages of a chunk; None: its index."""
+        """The function that finds the messages of a chunk; None: its index is used."""
         self.types = (SCAN, WRITE, *sorted({*types} - {SCAN, WRITE}))
         """The types of messages to read, in the order in which a block numbers them."""
 
     def take(self, block: MessageBlock) -> bool:
-        """Take a block; return whether more messages are of interest.
+        """Process a block; return whether more messages are of interest.
 
         Raises:
-            BagError: as ``take`` does of each of its messages.
+            BagError: as the given ``take`` does for each of its messages.
         """
         part = _BlockPart(block, self._names, self._commons.facts.table.run_id, self._rules, self._library)
         begin = 0
@@ -68,7 +68,7 @@ class BlockReplay:
         return self._between(part, begin, len(block))
 
     def _between(self, part: _BlockPart, begin: int, end: int) -> bool:
-        """Take what stands between two messages that have to be taken by themselves."""
+        """Process the messages between two that must be processed separately."""
         if end - begin < FEWEST_MESSAGES:
             return self._one_by_one(part, range(begin, end))
         left = part.strays_between(begin, end)
@@ -84,18 +84,18 @@ class BlockReplay:
         return self._writes(part, position, end)
 
     def _taken(self, name: str, scans: ScanColumns) -> int:
-        """Take scans of a task by columns up to the first odd one, and never the last; return how many."""
+        """Replay scans of a task by columns up to the first odd one, and never the last; return how many."""
         counted = scans.stamps >= self._begin
         alike = (counted == counted[0]) & ~scans.odd
         alike[-1] = False
         return self._stretches[name].take(scans.part(0, int(np.argmin(alike))), counted=bool(counted[0]))
 
     def _writes(self, part: _BlockPart, begin: int, end: int) -> bool:
-        """Take the writes between two places."""
+        """Apply the writes between two places."""
         return all(self._write_run(part, run) for run in part.writes.between(begin, end).runs())
 
     def _write_run(self, part: _BlockPart, run: WriteColumns) -> bool:
-        """Take writes that are all good or all not."""
+        """Apply writes that are all good or all not good."""
         if len(run.places) >= FEWEST_WRITES and run.good[0] and not self._looks_at_writes(part):
             entries = run.entries
             if self._commons.take_many(run.sequences, entries.views, entries.elements, entries.values):
@@ -103,7 +103,7 @@ class BlockReplay:
         return self._one_by_one(part, run.places.tolist())
 
     def _looks_at_writes(self, part: _BlockPart) -> bool:
-        """Return whether a task has to be told of each write: what others write counts, or scans stand after writes."""
+        """Return whether a task needs each write: those of others matter, or scans follow their writes in the log."""
         return any(
             task.memory.is_apart or (task.edited and part.is_modeled(task.name)) for task in self._tasks.values()
         )
@@ -129,7 +129,7 @@ class _BlockPart:
         self._modeled = {name: bool(scans.durations.any()) for name, scans in self._scans.items()}
 
     def by_themselves(self, end: int | None) -> list[int]:
-        """Return the places of what parts scans, ascending; from a scan beyond ``end`` on that is all."""
+        """Return the places of messages to process separately, ascending; all after the first scan beyond ``end``."""
         found = [np.flatnonzero(self.block.kinds > 1), self._forcing]
         if end is not None:
             beyond = [scans.places[scans.stamps > end] for scans in self._scans.values()]
@@ -145,7 +145,7 @@ class _BlockPart:
         return places
 
     def scans_between(self, name: str, begin: int, end: int) -> ScanColumns | None:
-        """Return the scans of a task between two places, None where there are none."""
+        """Return the scans of a task between two places, None if there are none."""
         scans = self._scans.get(name)
         if scans is None:
             return None
@@ -153,5 +153,5 @@ class _BlockPart:
         return scans.part(first, last) if last > first else None
 
     def is_modeled(self, name: str) -> bool:
-        """Return whether scans of a task took time; where there are none, they may do so in the block that follows."""
+        """Return whether scans of a task took time; TRUE without scans, for they may in the next block."""
         return self._modeled.get(name, True)

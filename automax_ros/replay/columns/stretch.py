@@ -1,7 +1,4 @@
-"""Executes stretches of one task's scans by columns, and compares them with what was recorded.
-
-What each of many scans latched, from what they newly latched.
-"""
+"""Executes stretches of one task's scans by columns, and compares them with the recorded ones."""
 
 from __future__ import annotations
 
@@ -24,16 +21,16 @@ from automax_ros.runtime.tasks.task import Task
 
 
 class LatchedColumns:
-    """Columns of the views that a task latches, in its order."""
+    """Builds columns of the values that a task latched, in its order of views, from the newly latched entries."""
 
     def __init__(self, views: Sequence[int], count: int, library: ColumnLibrary | None = None) -> None:
-        """Take the task's views, how many the rack has, and what does the same more quickly."""
+        """Create the columns of the task's views; ``count`` is the rack's number of views, ``library`` is faster."""
         self._count, self._library = len(views), library
         self._positions = np.full(count, -1, np.int64)
         self._positions[list(views)] = np.arange(len(views))
 
     def whole(self, scans: ScanColumns) -> int:
-        """Return up to which scan those that should tell all that is latched do so."""
+        """Return the number of scans before the first full one that lacks latched values."""
         entries = scans.latched
         for row in np.flatnonzero(scans.full).tolist():
             found = self._positions[entries.views[entries.offsets[row] : entries.offsets[row + 1]]]
@@ -59,12 +56,12 @@ class LatchedColumns:
 
 
 FEWEST_SCANS = 16
-"""Stretches of fewer scans go scan by scan (decision: columns cost as much as that many scans)."""
+"""Shorter stretches are executed scan by scan (decision: columns cost as much as that many scans)."""
 
 
 @dataclass(frozen=True)
 class _Form:
-    """How the task that runs now is executed."""
+    """The form in which the present task is executed."""
 
     task: Task
     columns: ColumnForm
@@ -72,15 +69,15 @@ class _Form:
     written: Ints
     """The views of the outputs."""
     places: Ints
-    """The places of the outputs among what is latched."""
+    """The places of the outputs among the latched views."""
     flags: tuple[bool, ...]
     """Which of the latched views are BOOLEANs."""
 
 
 class TaskStretches:
-    """Takes scans of one task by columns as far as nothing differs; those that it leaves go one by one.
+    """Replays scans of one task by columns as far as nothing differs; the rest must be replayed one by one.
 
-    What is doubtful counts as different: the path scan by scan decides it.
+    A doubtful scan counts as different: scan-by-scan replay decides about it.
     """
 
     def __init__(self, replay: TaskReplay, commons: RecordedCommons, rules: ValueRules, forms: ColumnForms) -> None:
@@ -89,7 +86,7 @@ class TaskStretches:
         self._form: _Form | None = None
 
     def take(self, scans: ScanColumns, *, counted: bool) -> int:
-        """Execute scans and compare them; return how many were taken over, from the first on."""
+        """Execute scans and compare them; return how many, from the first on, did not differ."""
         replay = self._replay
         if len(scans) < FEWEST_SCANS or not replay.is_uniform:
             return 0
@@ -121,7 +118,7 @@ class TaskStretches:
         return same
 
     def _present_form(self) -> _Form:
-        """Return how the task is executed: it may have been reloaded."""
+        """Return the form of the present task, which may have been reloaded."""
         task = self._replay.task
         if self._form is None or self._form.task.compiled is not task.compiled or self._form.task is not task:
             compiled = task.compiled
@@ -138,7 +135,7 @@ class TaskStretches:
         return self._form
 
     def _uniform(self, scans: ScanColumns, form: _Form) -> int:
-        """Return how many scans are of the kind that columns tell: they follow each other, and nothing is forced."""
+        """Return how many scans can be executed by columns: they are consecutive, and nothing is forced."""
         replay = self._replay
         if not self._commons.unforced_since(int(scans.stamps.min())):
             return 0
@@ -150,7 +147,7 @@ class TaskStretches:
         return min(count, form.latched.whole(scans))
 
     def _same(self, scans: ScanColumns, executed: Executed, latched: Ints, form: _Form) -> int:
-        """Return how many scans did what was recorded."""
+        """Return how many scans have the recorded results."""
         done = executed.done
         if not done:
             return 0
@@ -186,7 +183,7 @@ class TaskStretches:
 
 
 def _commits(outputs: Ints, latched: Ints, form: _Form) -> Entries:
-    """Return what END wrote back: the outputs that differ from what was latched, in their order."""
+    """Return the values that END wrote back: the outputs that differ from the latched values, in their order."""
     changed = (outputs != latched).T
     rows, numbers = np.nonzero(changed)
     offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(rows, minlength=len(changed)))))

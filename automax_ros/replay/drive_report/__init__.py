@@ -1,1 +1,1 @@
-"""What a recording tells of its drives and of its rack, for `automax report`."""
+"""Reports on the drives and the rack of a recording, for `automax report`."""

@@ -32,7 +32,7 @@ class DriveReport:
     drives: tuple[tuple[DriveRun, ErrorMarks], ...]
 
     def traces(self, run: DriveRun, marks: ErrorMarks) -> Traces:
-        """Return the lines of one drive as a picture takes them."""
+        """Return the lines of one drive for a picture."""
         lines = run.lines
         return Traces(self.rack, self.start_s, self.end_s, tuple(lines[:MAX_LINES]), tuple(marks.marks), marks.unmarked)
 
@@ -44,12 +44,12 @@ def drive_report(
     progress: Progress | None = None,
     references: Mapping[str, str] | None = None,
 ) -> DriveReport:
-    """Return what a recording tells of its drives, or of the one whose loop is in ``task``; none where it has none.
+    """Return the report on the drives of a recording, or on the one whose loop is in ``task``; empty without drives.
 
     ``references`` are commons with speed references, by the name of their drive (``report_drives``).
 
     Raises:
-        BagError: the recording cannot be read, ``task`` has no drive, or it holds nothing of them in the window.
+        BagError: the recording cannot be read, ``task`` has no drive, or the window has no data of them.
         SourceRefused: the rack file stored inside has errors.
     """
     stored = stored_rack(BagReader(bag))
@@ -65,7 +65,7 @@ def drive_report(
 
 
 class _Reader:
-    """The drives while a recording is read."""
+    """Reads a recording for the report on its drives."""
 
     def __init__(self, bag: Path, drives: Sequence[ReportDrive], window: Window) -> None:
         self._bag, self._window = bag, window
@@ -77,7 +77,7 @@ class _Reader:
         self._end_s = 0.0
 
     def read_commons(self, progress: Progress | None) -> None:
-        """Follow the commons of all drives, and what their tasks log."""
+        """Read the commons of all drives, and the errors of their tasks."""
         wanted: dict[str, list[tuple[DriveRun, str]]] = defaultdict(list)
         for run, _ in self._found:
             for keyword, signal in run.drive.signals.items():
@@ -106,7 +106,7 @@ class _Reader:
                     run.tell(time_ns / NS_PER_S, "error", error_text(error.code, error.line))
 
     def read_plants(self, progress: Progress | None) -> None:
-        """Follow the plants of all drives, and what was done to the rack."""
+        """Read the plants of all drives, and the operations on the rack."""
         reader = BagReader(self._bag)
         reader.on_progress = progress
         runs = {run.drive.name: run for run, _ in self._found}
@@ -126,7 +126,7 @@ class _Reader:
                 self._end_s = max(self._end_s, time_s)
 
     def report(self) -> DriveReport:
-        """Return all that was read."""
+        """Finish the runs and return the report."""
         for run, _ in self._found:
             run.finish(self._end_s)
             run.happened.finish(self._set)

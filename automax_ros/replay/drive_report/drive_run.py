@@ -1,4 +1,4 @@
-"""A drive's recorded run: its courses for a picture, its faults, what happened in which order, and its totals."""
+"""A drive's recorded run: its signals for a picture, its faults, the sequence of events, and its totals."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ STATES = {
     "DC_CML_STATE": ("the drive runs", "the drive is in standby"),
     "BRIDGE_POL": ("bridge 2 is on", "bridge 1 is on"),
 }
-"""Booleans of a drive and what their edges mean, rising and falling."""
+"""Booleans of a drive and the meanings of their edges, rising and falling."""
 DRAWN_STATES = ("CML_RUN", "DC_CML_STATE", "BRIDGE_POL")
 SUSPECT = "BAD_SCR_NUM"
 """The output with the number of a suspected SCR: that one or its anti-parallel partner (52.3.1)."""
 MOST_BROKEN = 40
-"""Most things that are broken in one plant."""
+"""Most faults of one plant that are followed."""
 PERCENT_SPEED, PERCENT_CURRENT, DEGREES = "% of full speed", "% of rated current", "deg"
 
 
 @dataclass(frozen=True)
 class FaultSpan:
-    """A fault output that was on: from when, and until when, s of the run; None where it was still on at the end."""
+    """A fault output that was on from ``begin_s`` to ``end_s``, s of the run, None if it was still on at the end."""
 
     keyword: str
     variable: str
@@ -51,14 +51,14 @@ class FaultSpan:
 
 @dataclass
 class DriveRun:
-    """The run of one drive while it is read; changes come in the order of time.
+    """Collects the run of one drive; changes are added in the order of time.
 
     Attributes:
-        drive: which drive.
+        drive: the drive.
         counts: totals from its commons.
         plant: totals from its plant's messages.
-        faults: fault outputs that were on and are off again; ``finish`` adds the others. ``fault_count`` is how many.
-        happened: the events, by which the sequence is told.
+        faults: fault outputs that were on and are off again; ``finish`` adds the others. ``fault_count`` counts all.
+        happened: the events, for the sequence of operations.
         starts, changes: how often it began to run, and how often the bridge changed while it ran.
     """
 
@@ -79,15 +79,15 @@ class DriveRun:
     _base_rpm: float | None = field(init=False)
 
     def __post_init__(self) -> None:
-        """Begin with nothing known."""
+        """Create the totals."""
         parameters = self.drive.parameters
         self.counts = CountTotals(parameters)
         self._base_rpm = rpm_of(parameters.values["base_speed_rad_s"].value) if parameters is not None else None
 
     def take(self, time_s: float, changed: Mapping[str, float]) -> None:
-        """Take the new values of signals, by keyword, at an instant; a fault is told before what follows from it.
+        """Add the new values of signals, by keyword, at an instant; a fault comes before its consequences.
 
-        Numbers that no drive has are passed over.
+        Numbers that no drive can have are ignored.
         """
         self._pass_to(time_s)
         seen = {
@@ -115,12 +115,12 @@ class DriveRun:
         self._time_s = time_s
 
     def _percent(self, keyword: str) -> float | None:
-        """Return a current, % of rated; None where it is not known."""
+        """Return a current, % of rated; None if it is unknown."""
         value, lim_bar = self._values.get(keyword), self.drive.lim_bar
         return None if value is None or lim_bar is None else value / FULL * lim_bar
 
     def _note(self, time_s: float, signal: Signal, before: float | None, value: float) -> None:
-        """Follow an edge."""
+        """Add the event of an edge."""
         keyword, on = signal.keyword, value != 0.0
         if keyword in FAULTS:
             self._note_fault(time_s, signal, on=on)
@@ -182,19 +182,19 @@ class DriveRun:
             self._append(label, PERCENT_SPEED, DataType.REAL, time_s, 100 * value / FULL, Role.REFERENCE)
 
     def _draw_speed(self, label: str, time_s: float, rpm: float, role: Role) -> None:
-        """Draw a speed in rpm next to the counts of SPEED_FDBK, where the motor's base speed is known."""
+        """Add a speed to the lane of SPEED_FDBK if the motor's base speed is known, else to one in rpm."""
         if self._base_rpm is None:
             self._append(label, "rpm", DataType.REAL, time_s, rpm, role)
         else:
             self._append(label, PERCENT_SPEED, DataType.REAL, time_s, 100 * rpm / self._base_rpm, role)
 
     def degrees(self) -> float | None:
-        """Return DELTA in degrees of the line's period, measured where it is recorded."""
+        """Return DELTA in degrees of the line's period, the measured one if it is recorded."""
         period_us = self._values.get("LINE_PERIOD") or 1e6 / self.drive.line_hz
         return 360 * self._values["DELTA"] / period_us
 
     def take_plant(self, time_s: float, message: PlantState) -> None:
-        """Take a message of the plant; one with numbers that no drive has is passed over."""
+        """Add a message of the plant; one with numbers that no drive can have is ignored."""
         numbers = (message.current_a, message.current_rms_a, message.speed_rpm, message.duration_s)
         if not all(abs(number) <= LARGEST for number in numbers):
             return
@@ -228,20 +228,20 @@ class DriveRun:
 
     @property
     def events(self) -> list[Event]:
-        """What happened, in the order of time once it is finished."""
+        """The events, in the order of time after ``finish``."""
         return self.happened.events
 
     @property
     def untold(self) -> int:
-        """How many events are not kept."""
+        """Number of events that are not kept."""
         return self.happened.untold
 
     def tell(self, time_s: float, kind: str, text: str) -> None:
-        """Note an event."""
+        """Add an event."""
         self.happened.tell(time_s, kind, text)
 
     def finish(self, end_s: float) -> None:
-        """End the run: what still holds, holds to the end."""
+        """End the run: the last values hold to the end."""
         self._pass_to(end_s)
         for keyword, begin_s in self._begun.items():
             signal = self.drive.signals[keyword]
@@ -252,7 +252,7 @@ class DriveRun:
 
     @property
     def lines(self) -> list[Line]:
-        """The courses for a picture: speed, current, DELTA, counts, words of bits, then booleans; by their meaning."""
+        """The lines for a picture: speed, current, DELTA, counts, words of bits, then booleans; each group by role."""
         order = {
             unit: place for place, unit in enumerate((PERCENT_SPEED, "rpm", PERCENT_CURRENT, "A", DEGREES, "counts"))
         }
@@ -288,7 +288,7 @@ _CONVERSIONS: dict[str, tuple[str, Callable[[DriveRun], float | None]]] = {
     "I_FDBK": (PERCENT_CURRENT, _current("I_FDBK")),
     "DELTA": (DEGREES, DriveRun.degrees),
 }
-"""The numbers that are drawn: unit and value; counts where the scale is not known."""
+"""Numbers that are drawn: unit and conversion; counts are drawn if the scale is unknown."""
 _ROLES = {
     "REFERENCE": Role.REFERENCE,
     "REF_LAG_OUT": Role.LAGGED,

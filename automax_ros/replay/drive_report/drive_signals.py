@@ -1,4 +1,4 @@
-"""Which recorded commons carry the inputs and outputs of a drive: the stored sources and the rack file tell it."""
+"""Finds the recorded commons with the inputs and outputs of a drive, from the stored sources and the rack file."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.scans.stored_rack import StoredRack
 
 SPEED_REF = "SPEED_REF"
-"""The keyword of the speed reference: the block has no such input, so the rack file or a person names it."""
+"""The keyword of the speed reference: the block has no such input, so the rack file or the user names it."""
 SECOND_DRIVE = 1000
-"""What is added to a register of drive A for that of drive B."""
+"""Offset from a register of drive A to that of drive B."""
 PMI_REGISTERS = range(100, 300)
 """Command and feedback registers of drive A of a UDC (S-3056)."""
 MOST_REGISTERS = 12
-"""Most of them that a report shows (decision: more cannot be told apart)."""
+"""Most of these registers in a report (decision: more cannot be told apart)."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Signal:
     Attributes:
         keyword: the parameter of DC_DRIVE_CML, or ``register 207`` of a UDC.
         variable: the common, or the element of one, as a recording names it.
-        inverted: whether the CALL turns it round.
-        text: what the signal is, in words.
-        scale: what its counts mean in rpm, None for one that is not counts of rpm.
-        is_rpm: whether it is a speed in rpm, by its scale or as it is.
+        inverted: whether the CALL inverts it.
+        text: its meaning in words.
+        scale: the scale of its counts in rpm, None for one that is not counts of rpm.
+        is_rpm: whether it is a speed in rpm, by its scale or unscaled.
     """
 
     keyword: str
@@ -58,12 +58,12 @@ class ReportDrive:
     Attributes:
         name: its plant, or its loop's task.
         where: the module that drives it, in words.
-        task: the task with its loop, "" where there is none.
-        signals: by keyword, those that are commons.
-        unseen: keywords whose variables are not commons, so that a recording does not have their course.
-        parameters: motor and line, None where they are not known.
-        lim_bar: LIM_BAR in %, None where it is not known.
-        line_hz: frequency of the line in Hz, as far as it is known, else 60.
+        task: the task with its loop, "" if there is none.
+        signals: the signals that are commons, by keyword.
+        unseen: keywords whose variables are not commons, so that their values are not recorded.
+        parameters: motor and line, None if they are unknown.
+        lim_bar: LIM_BAR in %, None if it is unknown.
+        line_hz: frequency of the line in Hz, 60 if it is unknown.
     """
 
     name: str
@@ -81,10 +81,10 @@ def report_drives(
 ) -> list[ReportDrive]:
     """Return the drives of a recorded rack in the order of slots, or the one whose loop is in ``task``.
 
-    ``references`` are the commons with the drives' speed references, by the drive's name, "" for the only one.
+    ``references`` are the commons with the drives' speed references, by the drive's name, "" for the only drive.
 
     Raises:
-        BagError: no such task, or it has no current minor loop; a reference is of no drive, or not a common.
+        BagError: there is no such task, or it has no current minor loop; a reference is for no drive, or not a common.
     """
     programs = stored.programs()
     drives = rack_drives(stored.config, programs)
@@ -101,7 +101,7 @@ def report_drives(
 
 
 def _given_references(stored: StoredRack, drives: Sequence[str], references: Mapping[str, str]) -> dict[str, Signal]:
-    """Return the speed references that a person names, by drive."""
+    """Return the speed references that the user names, by drive."""
     found: dict[str, Signal] = {}
     for drive, name in references.items():
         owner = drives[0] if not drive and len(drives) == 1 else drive
@@ -134,7 +134,7 @@ def _report_drive(
 ) -> ReportDrive:
     try:
         data = drive.data
-    except ParameterError:  # the rack file was right when it was recorded; the report does without
+    except ParameterError:  # the rack file was valid when it was recorded; the report omits the data
         data = None
     inputs = given_inputs(drive, config, programs, {})
     lim_bar, line_hz = inputs.get("LIM_BAR"), inputs.get("AC_LINE_FREQ")
@@ -178,7 +178,7 @@ def _of_call(drive: RackDrive, config: RackConfig) -> tuple[dict[str, Signal], t
 
 
 def _common(expression: Expression, program: Program, config: RackConfig) -> str | None:
-    """Return the common, or element, that an expression names; None where it is a local or not one element."""
+    """Return the common, or element, that an expression names; None for a local or for more than one element."""
     name = print_expression(expression)
     symbol = program.symbols.get(name.partition("(")[0])
     if symbol is None or symbol.scope is not Scope.COMMON:
@@ -201,13 +201,13 @@ def _of_registers(drive: RackDrive, config: RackConfig) -> dict[str, Signal]:
 
 
 _KEYWORDS = {CURRENT: "I_FDBK", SPEED: "SPEED_FDBK"}
-"""What registers of a PMI are that a current minor loop has too; 4095 counts are full scale of both (36)."""
+"""Keywords of a current minor loop for registers of a PMI; 4095 counts are full scale of both (36)."""
 _WORDS = {item.number: item.meaning for item in (*COMMAND_REGISTERS, *FEEDBACK_REGISTERS) if item.bits}
-"""Registers of a PMI that are words of bits: a number says nothing next to others."""
+"""Meanings of the PMI registers that are words of bits, which are not drawn with numbers."""
 
 
 def _registers(drive: RackDrive, config: RackConfig) -> Iterator[tuple[int, str]]:
-    """Yield register, counted as drive A's, and common."""
+    """Yield the register, numbered as drive A's, and the common of each."""
     base = SECOND_DRIVE * (drive.letter == "B")
     for variable in config.declared:
         point = variable.point

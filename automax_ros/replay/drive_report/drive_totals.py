@@ -13,10 +13,10 @@ J_PER_KWH = 3.6e6
 
 @dataclass
 class PlantTotals:
-    """What the messages of a plant add up to. Energies are those from the first message to the last.
+    """The totals of a plant's messages. Energies are those from the first message to the last.
 
     Attributes:
-        time_s: the time of all means.
+        time_s: the time over which means are taken.
         greatest_a: greatest mean of a sample, A, as a magnitude.
         greatest_rpm: greatest speed, rpm, as a magnitude.
     """
@@ -30,7 +30,7 @@ class PlantTotals:
     _last: PlantState | None = None
 
     def take(self, message: PlantState) -> None:
-        """Add a message; the time before the first one is not part of the run that is looked at."""
+        """Add a message; the time before the first one is not counted."""
         self.messages += 1
         self.greatest_rpm = max(self.greatest_rpm, abs(message.speed_rpm))
         self._last = message
@@ -47,7 +47,7 @@ class PlantTotals:
         return sqrt(self._square / self.time_s) if self.time_s > 0 else 0.0
 
     def energy_j(self, name: str) -> float:
-        """Return by how much an energy grew, J, by its field's name such as ``line_j``; nan where it is not metered."""
+        """Return the increase of an energy, J, by its field's name such as ``line_j``; NaN if it is not metered."""
         if self._first is None or self._last is None:
             return nan
         return float(getattr(self._last, name) - getattr(self._first, name))
@@ -60,10 +60,10 @@ class PlantTotals:
 
 @dataclass
 class CountTotals:
-    """What the counts of current and speed add up to: each holds until it changes, the current is 0 in standby.
+    """The totals of the counts of current and speed: each holds until it changes, the current is 0 in standby.
 
     Attributes:
-        parameters: motor and line, None where they are not known: then there are no energies.
+        parameters: motor and line, None if they are unknown: then there are no energies.
         time_s: the time since the first count of current.
         run_s: the part of it in which the drive ran.
         greatest: greatest current, % of rated, as a magnitude.
@@ -82,7 +82,7 @@ class CountTotals:
     _square: float = 0.0
 
     def pass_time(self, seconds: float, current: float | None, speed: float | None, *, running: bool) -> None:
-        """Let time pass with a current in % of rated and a speed in % of full speed; None for what is not known."""
+        """Add a time with a current in % of rated and a speed in % of full speed, None if they are unknown."""
         if speed is not None:
             self.greatest_speed = max(self.greatest_speed, abs(speed))
         if current is None:

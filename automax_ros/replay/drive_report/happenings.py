@@ -1,4 +1,4 @@
-"""What happened in a recorded run: events of states, faults, errors, operations, and values that were set."""
+"""The events of a recorded run: states, faults, errors, operations, and values that were set."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from automax_ros.rack.operator.faults import meaning_of
 from automax_ros.recordings.read.common_log import Cell
 
 MOST_EVENTS = 2000
-"""Most events of a kind, and faults, of one drive that are kept; the first ones are (decision: a bound on memory)."""
+"""Most events of a kind, and most faults, of one drive; the first ones are kept (decision: a bound on memory)."""
 LONGEST = 300
 """Longest text of an event."""
 TOGETHER_NS = NS_PER_S // 10
-"""Values that follow each other as closely are one course: the samples of a ramp or a sine (decision)."""
+"""Values that follow each other this closely are one course: the samples of a ramp or a sine (decision)."""
 _WHO = {WriterKind.ROS: "ROS sets", WriterKind.OPERATOR: "set"}
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened, s of the run. ``kind``: ``state``, ``fault``, ``error``, ``plant`` or ``operation``."""
+    """An event, at s of the run. ``kind``: ``state``, ``fault``, ``error``, ``plant`` or ``operation``."""
 
     time_s: float
     kind: str
@@ -45,17 +45,17 @@ class _Written:
 
 
 class ValuesSet:
-    """What operators, stimuli and ROS have written, each value once; values that follow closely are one course."""
+    """The values that operators, stimuli and ROS have written; values that follow each other closely are one course."""
 
     def __init__(self) -> None:
-        """Begin with nothing written."""
+        """Create the collection, without values."""
         self._open: dict[str, _Written] = {}
         self._told: list[tuple[int, str]] = []
         self._values: dict[str, Cell] = {}
         self.untold = 0
 
     def take(self, time_ns: int, writer: WriterKind, values: Sequence[tuple[str, Cell]]) -> None:
-        """Take a write; what ROS says again and again is told once."""
+        """Add a write; a value that ROS repeats is added once."""
         for name, value in values:
             if writer is WriterKind.ROS and self._values.get(name) == value:
                 continue
@@ -68,7 +68,7 @@ class ValuesSet:
             self._open[name] = _Written(time_ns, writer, value, time_ns, value)
 
     def events(self) -> list[Event]:
-        """Return all that was written, in the order of time."""
+        """Return all writes as events, in the order of time."""
         for name in list(self._open):
             self._tell(name)
         told = sorted(self._told, key=lambda item: item[0])
@@ -90,14 +90,14 @@ class ValuesSet:
 
 @dataclass
 class Happenings:
-    """The events of a run while it is read, at most ``MOST_EVENTS`` of a kind; ``untold`` counts the rest."""
+    """Collects the events of a run, at most ``MOST_EVENTS`` of a kind; ``untold`` counts the rest."""
 
     events: list[Event] = field(default_factory=list)
     untold: int = 0
     _told: Counter[str] = field(default_factory=Counter)
 
     def tell(self, time_s: float, kind: str, text: str) -> None:
-        """Note an event."""
+        """Add an event."""
         self._told[kind] += 1
         if self._told[kind] <= MOST_EVENTS:
             self.events.append(Event(time_s, kind, cut(text)))
@@ -105,14 +105,14 @@ class Happenings:
             self.untold += 1
 
     def finish(self, values_set: ValuesSet) -> None:
-        """Bring all into the order of time; of one instant what was set comes first, for the rest follows from it."""
+        """Sort the events by time; at one instant, values that were set come first, for the rest follows from them."""
         self.events[:0] = values_set.events()
         self.untold += values_set.untold
         self.events.sort(key=lambda event: event.time_s)
 
 
 def cut(text: str) -> str:
-    """Return a text no longer than an event's."""
+    """Return a text, cut to the longest of an event."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 

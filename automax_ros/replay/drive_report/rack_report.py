@@ -1,4 +1,4 @@
-"""What a recording tells of a rack without a drive: its tasks, what is worth watching, errors and operations."""
+"""The report on a recorded rack without a drive: its tasks, watched commons, errors and operations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from automax_ros.replay.scans.stored_rack import stored_rack
 
 @dataclass(frozen=True)
 class TaskRun:
-    """A task of the rack and what it did; ``period_ns`` is 0 where it has none, or its source is not stored."""
+    """A task of the rack with its counts; ``period_ns`` is 0 if it has none, or if its source is not stored."""
 
     name: str
     where: str
@@ -31,7 +31,7 @@ class TaskRun:
 
 @dataclass(frozen=True)
 class RackReport:
-    """The courses of the commons that the rack file watches, the tasks in the order of slots, and what happened."""
+    """The commons that the rack file watches, over time, the tasks in the order of slots, and the events."""
 
     traces: Traces
     tasks: tuple[TaskRun, ...]
@@ -39,10 +39,10 @@ class RackReport:
 
 
 def rack_report(bag: Path, window: Window = WHOLE_RUN, progress: Progress | None = None) -> RackReport:
-    """Return what a recording tells of its rack.
+    """Return the report on the rack of a recording.
 
     Raises:
-        BagError: the recording cannot be read, or holds nothing in the window.
+        BagError: the recording cannot be read, or has no data in the window.
         SourceRefused: the rack file stored inside has errors.
     """
     reader = BagReader(bag)

@@ -1,1 +1,1 @@
-"""Replay scan by scan: what a scan saw, and what differs."""
+"""Replay scan by scan: the inputs of a scan, and the differences."""

@@ -1,14 +1,12 @@
-"""Whether a replay that begins with a file of a recording is the same as one that comes to it from the file before.
+"""Proof that a replay that begins with a file of a recording equals one that continues from the file before.
 
-Each file of a split recording begins with an image of memory and the states of all tasks. One pass takes a file, and of
-the next one what stands before its first scan; another begins with that next file. Where what both carry is the same at
-that place, all that follows is the same, too, and what they count can be added up.
+Each file of a split recording begins with an image of memory and the states of all tasks. One pass processes a file and
+the beginning of the next one up to its first scan; another pass begins with that next file. If both carry the same
+state at that place, everything after it is the same, too, and their totals can be added up.
 
-What was before the file and is told nowhere in it is left out of the comparison, and a pass says if it asks for it:
-values that were latched before (the first scan of each task is a full one), when the task scanned last, whether a task
-that does not scan any more has stopped by itself, forces that held earlier. Then it proves nothing.
-
-What the path scan by scan must know of scans that were executed otherwise.
+Information from before the file that is nowhere in it is excluded from the comparison, and a pass reports if it needs
+it: values latched before (unless the first scan of a task is a full one), when the task scanned last, whether a task
+that no longer scans has stopped by itself, forces that held earlier. Then the comparison proves nothing.
 """
 
 from __future__ import annotations
@@ -23,9 +21,10 @@ from automax_ros.messages.types.messages import Scan
 
 @dataclass(frozen=True)
 class Skipped:
-    """Scans that were executed again elsewhere: stamp, length, number and ``latched`` are those of the last.
+    """State that scan-by-scan replay needs about scans replayed in columns.
 
-    ``errors`` are scan, line and code of each that was logged.
+    Stamp, duration, number and ``latched`` are those of the last scan. ``errors`` are scan, line and code of each
+    logged error.
     """
 
     count: int
@@ -38,9 +37,9 @@ class Skipped:
 
 
 class PartStart:
-    """What one task asks of the time before its first message: ``unsure`` if an answer may matter.
+    """The information that one task needs from before its first message: ``unsure`` if it may matter.
 
-    ``scanned`` and ``went_on``: whether a scan came, and whether the first one was not the start of the task.
+    ``scanned``: there was a scan; ``went_on``: the first one was not the start of the task.
     """
 
     def __init__(self) -> None:
@@ -49,15 +48,15 @@ class PartStart:
 
     @property
     def is_settled(self) -> bool:
-        """Whether a scan has told what it latched: later ones ask for nothing before the first message."""
+        """Whether there was a scan with its latched values: later ones need nothing from before the first message."""
         return self._latch_told
 
     def asks_back(self, matters: bool) -> None:
-        """When the task scanned last is asked for."""
+        """Record that the time of the last scan is needed; ``matters``: the result depends on it."""
         self.unsure = self.unsure or (matters and not self.scanned)
 
     def scans(self, scan: Scan) -> None:
-        """A scan comes."""
+        """Record a scan."""
         if not self.scanned:
             self.scanned, self.went_on = True, scan.scan != 0
         if not self._latch_told and scan.scan:
@@ -67,7 +66,7 @@ class PartStart:
 
 @dataclass(frozen=True)
 class CarriedState:
-    """What a pass carries to a place of a recording: a SHA-256, the stopped tasks, whether no force has ever held."""
+    """The state of a pass at a place of a recording: a SHA-256, the stopped tasks, whether no force has ever held."""
 
     content: str
     stopped: frozenset[str]

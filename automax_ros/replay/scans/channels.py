@@ -1,4 +1,4 @@
-"""What a recorded burst of a BASIC task got out of channels, given to it again."""
+"""Repeats the messages and outcomes that a recorded burst of a BASIC task got from channels."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from automax_ros.recordings.read.common_log import Entry
 from automax_ros.runtime.scan.channels import CHANNEL_VIEWS, Message, item_types
 
 CHANNELS = frozenset(CHANNEL_VIEWS.values())
-"""The views of what came out of channels."""
+"""The views of values from channels."""
 
 
 class RecordedChannels:
-    """Each access to a channel of a number has the outcome of the recorded burst's next one to it.
+    """Channels on which each access has the outcome of the recorded burst's next access to that channel number.
 
-    Where an edited task goes beyond those it must wait (decision: what it would have received nobody knows).
+    After the last of those an edited task must wait (decision: what it would have received nobody knows).
     """
 
     def __init__(self) -> None:
-        """Begin with no burst."""
+        """Create the channels, before the first burst."""
         self._entries: dict[int, deque[tuple[int, Value]]] = {}
         self.other: list[tuple[int, Message, Message]] = []
 
     def begin(self, entries: Iterable[Entry]) -> None:
-        """Take what a recorded burst got: view, number of the channel, value."""
+        """Begin a burst with its recorded entries: view, number of the channel, value."""
         self._entries = {}
         self.other.clear()
         for view, number, value in entries:
@@ -58,11 +58,11 @@ class RecordedChannels:
         return outcome
 
     def unsent(self, number: int) -> Message:
-        """Return what the recorded burst has sent to a channel and this one has not, as one message."""
+        """Return the items that the recorded burst sent to a channel and this one did not, as one message."""
         return tuple(value for _, value in self._entries.get(number, ()))
 
     def _items(self, number: int, types: str) -> Message:
-        """Return the next items, as many as there are of these types."""
+        """Return the next items as far as they are of these types."""
         items: list[Value] = []
         for kind in item_types(types):
             item = self._next(number, CHANNEL_VIEWS[kind])

@@ -1,4 +1,4 @@
-"""Common memory as a recording has told it so far: what every task's scans stand on in a replay."""
+"""Common memory as recorded so far, from which every task's scans read in a replay."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from automax_ros.runtime.memory.registers import RegisterMap
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 _FORCES_KEPT = 1000
-"""Changes of the force table that are remembered, those of an image included (decision: a bound on memory)."""
+"""Changes of the force table that are remembered, including those by an image (decision: a bound on memory)."""
 
 
 class UnknownValue(Exception):
-    """A scan asked for a value that the recording has not told; ``key`` says which."""
+    """A scan needs a value that is not in the recording; ``key`` identifies it."""
 
     def __init__(self, key: Key) -> None:
         super().__init__(key)
@@ -33,12 +33,12 @@ class UnknownValue(Exception):
 
 
 class RecordedCommons(CommonLog):
-    """All of common memory as the recording has told it so far; ``rack`` is the recorded rack's configuration.
+    """All of common memory as recorded so far; ``rack`` are the variables of the recorded rack.
 
     ``backplane`` finds the registers of its modules.
-    ``asked_back`` tells that forces were asked for at an instant before the first message.
+    ``asked_back``: forces at an instant before the first message were needed.
     ``gaps`` counts places where writes are missing; after one nothing is known until the next image. ``forced`` are the
-    values that a force holds.
+    forced values.
     """
 
     def __init__(self, bag: Path, facts: RunFacts, rack: RackConfig) -> None:
@@ -60,7 +60,7 @@ class RecordedCommons(CommonLog):
         self._cells: list[Value | None] = [None] * size
 
     def take(self, message: CommonImage | CommonWrite) -> list[Entry] | None:
-        """Take a message of the write log over; return its entries, None if they were known already.
+        """Apply a message of the write log; return its entries, None if they were known already.
 
         Raises:
             BagError: it does not fit the variables of the rack.
@@ -75,19 +75,19 @@ class RecordedCommons(CommonLog):
 
     @property
     def carried(self) -> tuple[object, ...]:
-        """What it has been told so far, but for when forces changed."""
+        """All that is known so far, except the times at which forces changed."""
         return self._cells, self._log.sequence, self.gaps > 0, sorted(self.forced)
 
     @property
     def knows_no_force(self) -> bool:
-        """Whether no force has ever held, as far as it was told."""
+        """Whether no force has ever held, as far as recorded."""
         return not self.forced and not self._forced_before
 
     def value(self, key: Key) -> Value:
-        """Return a value as it is now.
+        """Return the present value.
 
         Raises:
-            UnknownValue: the recording has not told it.
+            UnknownValue: it has not been recorded.
         """
         value = self._cells[self._start[key[0]] + key[1]]
         if value is None:
@@ -95,11 +95,11 @@ class RecordedCommons(CommonLog):
         return value
 
     def is_known(self, key: Key) -> bool:
-        """Return whether the recording has told a value."""
+        """Return whether a value has been recorded."""
         return self._cells[self._start[key[0]] + key[1]] is not None
 
     def forced_at(self, stamp: int) -> frozenset[Key]:
-        """Return what forces held at an instant not long ago: modeled scans stand in the log where they ended."""
+        """Return the values forced at a recent instant: a modeled scan is in the log where it ended."""
         if self._since is None or stamp < self._since:
             self.asked_back = True
         forced = self.forced
@@ -110,14 +110,14 @@ class RecordedCommons(CommonLog):
         return forced
 
     def unforced_since(self, stamp: int) -> bool:
-        """Return whether it is told that no force has held from an instant on."""
+        """Return whether it is known that no force has held from an instant on."""
         is_told = self._since is not None and stamp >= self._since
         return is_told and not self.forced and all(changed_at <= stamp for changed_at, _ in self._forced_before)
 
     def take_many(self, sequences: Ints, views: Ints, elements: Ints, values: Floats) -> bool:
-        """Take the entries of writes that follow each other, of this run and fitting; no force is among them.
+        """Apply the entries of consecutive writes of this run, which fit the variables; no force is among them.
 
-        Returns FALSE, with nothing taken, where they do not follow on what is known.
+        Returns FALSE, with nothing applied, if they do not follow the last known write.
         """
         log = self._log
         if log.sequence is None or int(sequences[0]) != log.sequence + 1:
@@ -142,7 +142,7 @@ class RecordedCommons(CommonLog):
         self._cells = [None] * len(self._cells)
 
     def _follow_forces(self, message: CommonImage | CommonWrite) -> None:
-        """Take over which values are held: a force tells it, and after an image it is told again."""
+        """Update the forced values: forces and releases change them, and after an image they are recorded again."""
         if isinstance(message, CommonImage):
             self._hold(frozenset(), message.stamp)
             return

@@ -1,6 +1,7 @@
-"""Counts what differs between recorded and replayed scans: first, greatest, how often, and where it settles.
+"""Counts the differences between recorded and replayed scans: first, greatest, how often, and where they settle.
 
-What is kept does not grow with the recording: a tally for each thing that differs, up to a limit; the rest is counted.
+Memory does not grow with the recording: one tally is kept for each item that differs, up to a limit; the rest is only
+counted.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ from automax_ros.replay.scans.report import (
 BAND_COUNTS = 2
 """A difference of whole numbers counts as settled within this many counts (decision) ..."""
 BAND_SHARE = 0.05
-"""... or, for REALs too, within this share of the recorded value (decision)."""
+"""... or, for REALs too, within this share of the greatest difference (decision)."""
 SETTLED_SCANS = 10
 """Scans that a difference must stay within that band to count as settled (decision)."""
 _MOST_COUNTED = 100_000
-"""Most things beyond the limit that are told apart; there may be more, but nobody reads that."""
+"""Most items beyond the limit that are counted; a greater number would be of no use."""
 
 
 class Found(NamedTuple):
-    """What differs after one scan; ``counts`` is FALSE where it lies within the tolerance."""
+    """An item that differs after one scan; ``counts`` is FALSE if the difference is within the tolerance."""
 
     kind: Kind
     key: Hashable
@@ -41,7 +42,7 @@ class Found(NamedTuple):
 
 
 class Label(NamedTuple):
-    """How the report calls a thing: name, unit, and the BASIC lines that can write it."""
+    """An item's name in the report, its unit, and the BASIC lines that can write it."""
 
     name: str
     unit: str = ""
@@ -49,14 +50,14 @@ class Label(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What a scan saw: latched values and reads, with their names."""
+    """The inputs of a scan: latched values and reads, with their names."""
 
     latched: tuple[NamedValue, ...] = ()
     read: tuple[NamedValue, ...] = ()
 
 
 class _Run:
-    """The stretch of scans, up to now, in which a difference has stayed in its band; ``floor`` is its least width."""
+    """The latest stretch of scans in which a difference has stayed in its band; ``floor`` is the band's least width."""
 
     def __init__(self, scan: int, time_s: float, difference: float, floor: float) -> None:
         self._floor = floor
@@ -66,7 +67,7 @@ class _Run:
         self._zero_scan, self._zero_time_s, self._zeros = scan, time_s, 0
 
     def add(self, scan: int, time_s: float, difference: float) -> None:
-        """Go on by a scan; outside of the band, and after a stretch of equality, a new stretch begins."""
+        """Add a scan; outside of the band, and after a stretch of equality, a new stretch begins."""
         if difference:
             was_equal, self._zeros = self._zeros >= SETTLED_SCANS, 0
         else:
@@ -85,7 +86,7 @@ class _Run:
         self._latest = difference
 
     def settled(self) -> Settled | None:
-        """Return the stretch, None where it is too short to be called settled."""
+        """Return the stretch, None if it is too short or still drifts."""
         if self._zeros >= SETTLED_SCANS:
             return Settled(self._zero_scan, self._zero_time_s, 0, 0)
         moves = self._high - self._low > self._floor and self._same < SETTLED_SCANS
@@ -96,7 +97,7 @@ class _Run:
 
 
 class _Count:
-    """One thing that differs in at least one scan."""
+    """The tally of one item that differs in at least one scan."""
 
     def __init__(self, task: str, kind: Kind, label: Label, first: Point) -> None:
         self.task, self.kind, self.label, self.first = task, kind, label, first
@@ -105,7 +106,7 @@ class _Count:
         self._run: _Run | None = None
 
     def differs(self, found: Found, scan: int, time_s: float) -> None:
-        """Count a scan after which it differs."""
+        """Count a scan after which the item differs."""
         self._scans += found.counts
         if self.kind is not Kind.VARIABLE:
             return
@@ -118,12 +119,12 @@ class _Count:
         self._goes_on(scan, time_s, difference, BAND_COUNTS if isinstance(difference, int) else 0)
 
     def agrees(self, scan: int, time_s: float) -> None:
-        """Count a scan after which it does not differ."""
+        """Count a scan after which the item does not differ."""
         if self._run is not None:
             self._run.add(scan, time_s, 0)
 
     def result(self) -> Difference:
-        """Return what was counted."""
+        """Return the difference that was counted."""
         settled = self._run.settled() if self._run else None
         label = self.label
         return Difference(
@@ -146,7 +147,7 @@ class _Count:
 
 
 class DifferenceCounts:
-    """All that differs in one replay; times count from ``origin`` (ns), at most ``limit`` things are told in full."""
+    """All differences of one replay; times count from ``origin`` (ns), at most ``limit`` items are kept in full."""
 
     def __init__(self, origin: int, limit: int) -> None:
         self.origin = origin
@@ -173,7 +174,7 @@ class DifferenceCounts:
         label: Callable[[Kind, Hashable], Label],
         seen: Callable[[], Seen],
     ) -> bool:
-        """Count one scan; return whether it differs. ``label`` and ``seen`` are asked at a thing's first difference."""
+        """Count one scan; return whether it differs. ``label`` is called for a new item, ``seen`` for the first."""
         tallies = self._by_task.setdefault(task, {})
         if not found and not tallies:
             return False
@@ -213,13 +214,13 @@ class DifferenceCounts:
             self._first = (task, scan, time_s, seen())
 
     def differences(self) -> tuple[Difference, ...]:
-        """Return everything that was told in full, by the time of its first difference."""
+        """Return all differences that are kept in full, by the time of their first occurrence."""
         tallies = [tally for by_key in self._by_task.values() for tally in by_key.values()]
         return tuple(sorted((tally.result() for tally in tallies), key=lambda item: item.first.time_s))
 
     @property
     def more(self) -> int:
-        """How many things differ beyond the limit."""
+        """Number of items that differ beyond the limit."""
         return len(self._beyond)
 
     def first(self) -> FirstScan | None:
@@ -234,7 +235,7 @@ class DifferenceCounts:
     def _new(
         self, task: str, item: Found, scan: int, time_s: float, label: Callable[[Kind, Hashable], Label]
     ) -> _Count | None:
-        """Begin a tally; None beyond the limit."""
+        """Create a tally; None beyond the limit."""
         if self._count >= self._limit:
             if len(self._beyond) < _MOST_COUNTED:
                 self._beyond.add((task, item.kind, item.key))
@@ -253,7 +254,7 @@ def within(recorded: Value, replayed: Value, tolerance: float) -> bool:
 
 
 def _difference(recorded: Value, replayed: Value) -> float | None:
-    """How much is replayed more than was recorded; None if they are not numbers."""
+    """Return the replayed minus the recorded value; None if they are not numbers."""
     for value in (recorded, replayed):
         if isinstance(value, (bool, str)):
             return None

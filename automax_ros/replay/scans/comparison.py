@@ -1,4 +1,4 @@
-"""Compares what one task's recorded scans did with what they do when they are executed again."""
+"""Compares the recorded scans of one task with the replayed ones."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from automax_ros.runtime.tasks.task import ScanRecord
 
 
 class ScanComparison:
-    """Finds what differs in the scans of one task, with its names; ``source`` is what it executes now.
+    """Finds the differences in the scans of one task, with their names; ``source`` is executed now.
 
     Numbers that differ by at most ``tolerance`` count as equal.
     """
@@ -41,7 +41,7 @@ class ScanComparison:
         self._record: ScanRecord | None = None
 
     def take_up(self, source: ReplaySource) -> None:
-        """Go on with another source: the recorded task was reloaded."""
+        """Switch to another source, after the recorded task was reloaded."""
         self._source, self._written_at = source, source.written_at
 
     def scan(self, scan: Scan, record: ScanRecord, changes: Sequence[tuple[Key, Value, Value]]) -> bool:
@@ -60,11 +60,11 @@ class ScanComparison:
         return self.tally(scan.scan, scan.stamp, found)
 
     def tally(self, scan: int, stamp: int, found: list[Found]) -> bool:
-        """Hand what was found after a scan to the tallies; return whether it counts."""
+        """Count the differences after a scan; return whether the scan differs."""
         return bool(self._tallies.scan(self._source.name, scan, stamp, found, self.label, self.seen))
 
     def label(self, kind: Kind, key: Hashable) -> Label:
-        """Return how the report calls a thing."""
+        """Return the label of an item in the report."""
         if kind is Kind.VARIABLE:
             variable = self._variable(cast(Key, key))
             lines = self._written_at.get(variable.name, ())
@@ -77,7 +77,7 @@ class ScanComparison:
         return Label(words.get(kind) or f"state {key}")
 
     def seen(self) -> Seen:
-        """Return what the last scan saw."""
+        """Return the inputs of the last scan."""
         record = self._record
         if record is None:
             return Seen()
@@ -95,7 +95,7 @@ class ScanComparison:
         return element_name(self._variable((view, element)), element)
 
     def _other_writes(self, writes: Sequence[Entry]) -> list[Found]:
-        """What differs in the order of writes, although every variable ends up the same."""
+        """Return the difference in the order of writes, although every variable ends up the same."""
         recorded = self._memory.recorded_writes
         for number in range(max(len(writes), len(recorded))):
             one = recorded[number] if number < len(recorded) else None
@@ -106,7 +106,7 @@ class ScanComparison:
         return []
 
     def _other_messages(self) -> list[Found]:
-        """What differs in what a BASIC task sent to channels."""
+        """Return the differences in the messages that a BASIC task sent to channels."""
         channels = self._memory.channels
         first: dict[int, Found] = {}
         for number, recorded, own in channels.other:
@@ -122,7 +122,7 @@ class ScanComparison:
         return found
 
     def _other_commands(self) -> list[Found]:
-        """What differs in what a loop commanded its 57C406; with a tolerance that counts for nothing (decision)."""
+        """Return the differences in a loop's commands to its 57C406; with a tolerance they do not count (decision)."""
         counts = not self._tolerance
         return [Found(Kind.COMMAND, name, recorded, own, counts) for name, recorded, own in self._memory.drive.other()]
 
@@ -133,7 +133,7 @@ class ScanComparison:
         return same_bits(recorded, own) or within(recorded, own, self._tolerance)
 
     def _other_errors(self, scan: Scan, record: ScanRecord) -> list[Found]:
-        """Run-time errors that differ; in an edited task lines do not count."""
+        """Return the difference in run-time errors; in an edited task lines do not count."""
         recorded = [(error.line, error.code) for error in scan.errors]
         own = list(record.errors)
         if self._source.edited:

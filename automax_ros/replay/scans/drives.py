@@ -1,4 +1,4 @@
-"""What a recorded scan of a current minor loop task was told by its 57C406, told again; and what it has commanded."""
+"""Repeats the measurements that a recorded current minor loop task got from its 57C406, and compares its commands."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from automax_ros.runtime.scan.drives import NO_LINE
 from automax_ros.runtime.time.scheduler import EventKey, PeriodicAction
 
 DRIVES = frozenset({MEASURED_VIEW, COMMAND_VIEW})
-"""The views of what passed between a loop and its 57C406."""
+"""The views of measurements and commands between a loop and its 57C406."""
 _RELAYS = {0: "none", FMCR: "FMCR", RMCR: "RMCR"}
 
 
 class RecordedDrive:
-    """Each measurement is the recorded one; a command is kept, to be compared.
+    """A 57C406 that returns the recorded measurements and keeps each command, to be compared.
 
     A scan that had none, since its task ran no loop then, sees no line (decision).
     """
@@ -32,14 +32,14 @@ class RecordedDrive:
     next_ns = None
 
     def __init__(self) -> None:
-        """Begin with no scan."""
+        """Create the drive, before the first scan."""
         self._measured = NO_LINE
         self._now_ns: int | None = None
         self._recorded: Command | None = None
         self._own: Command | None = None
 
     def begin(self, entries: Iterable[Entry]) -> None:
-        """Take what a recorded scan was told and has commanded."""
+        """Begin a scan with its recorded measurement and command."""
         noted = [(view, element, int(value)) for view, element, value in entries]
         self._measured = measured_of(noted) or NO_LINE
         self._now_ns = time_of(noted)
@@ -55,10 +55,10 @@ class RecordedDrive:
         return now_ns if self._now_ns is None else self._now_ns
 
     def initialise(self) -> None:
-        """Do nothing: what a 57C406 did stands in the recording."""
+        """Do nothing: the effects of a 57C406 are in the recording."""
 
     def watch_speed(self, counts: int) -> None:
-        """Do nothing: what the circuit saw stands in the recording."""
+        """Do nothing: the measurements of the circuit are in the recording."""
 
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
         """Do nothing: scans come from the recording."""
@@ -71,11 +71,11 @@ class RecordedDrive:
         return self._measured
 
     def command(self, command: Command) -> None:
-        """Keep what is commanded now."""
+        """Keep the command of the replayed scan."""
         self._own = command
 
     def other(self) -> Iterator[tuple[str, str, str]]:
-        """Yield what of the command differs: its name, as recorded, as commanded now."""
+        """Yield the parts of the command that differ: name, recorded text, replayed text."""
         if self._own == self._recorded:
             return
         recorded, own = _texts(self._recorded), _texts(self._own)
@@ -117,4 +117,4 @@ _KNOWN: dict[str, tuple[str, Callable[[Any], str]]] = {
     "block": ("end of open gate pulses", str),
 }
 _PARTS = {name: _KNOWN.get(name, (name, str)) for name in Command._fields}
-"""What each part of a command is called, and its words."""
+"""The title of each part of a command, and the function that returns its text."""

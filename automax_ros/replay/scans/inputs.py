@@ -1,6 +1,6 @@
-"""What a recorded scan saw: common memory as the write log tells it, and the four memory operations of one scan on it.
+"""The inputs of a recorded scan: common memory rebuilt from the write log, with the four memory operations of a scan.
 
-In the log a scan stands before the writes that it caused, so common memory as rebuilt so far is what the scan saw.
+In the log a scan precedes its writes, so common memory as rebuilt so far is the memory that the scan saw.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from automax_ros.replay.scans.drives import DRIVES, RecordedDrive
 from automax_ros.runtime.memory.views import LatchPlan, latch_plan
 
 _APART = CHANNELS | DRIVES
-"""The views of what a scan got from elsewhere than memory."""
+"""The views of inputs that do not come from memory."""
 
 
 class ScanMemory:
-    """Common memory as one task's recorded scans saw it; what the task does to it is kept apart.
+    """Common memory as one task's recorded scans saw it; the replayed task's own changes are kept separately.
 
-    A scan reads what it wrote itself, in this scan or an earlier one as long as nobody else has written there since. As
-    long as it reads and writes in the recorded order, its other reads are the recorded ones; but where the recorded
-    scan wrote the variable itself, an edited one, which may not have done so, reads the memory of the recording.
+    A scan reads its own writes, of this scan or of an earlier one unless there was another write since. As long as it
+    reads and writes in the recorded order, its other reads return the recorded values; but where the recorded scan
+    wrote the variable itself, an edited one, which may not have done so, reads the memory of the recording.
 
     ``apart`` are the values that the task's own writes left different from the recorded ones. ``channels`` are those of
     a BASIC task, ``drive`` is that of a current minor loop task.
 
-    A modeled scan stands in the log where it ended, some of its own writes before it. An edited one reads what memory
-    is there, without these: others may have written it since the latch (decision).
+    A modeled scan is in the log where it ended, after some of its own writes. An edited one reads the memory at that
+    place, without these: others may have written it since the latch (decision).
     """
 
     def __init__(self, commons: RecordedCommons, *, edited: bool = False) -> None:
-        """Take the memory of the recording; ``edited``: another source runs than the recorded one."""
+        """Create the memory on that of the recording; ``edited``: a different source runs than the recorded one."""
         self.now_ns = 0
         self.channels = RecordedChannels()
         self.drive = RecordedDrive()
@@ -58,11 +58,11 @@ class ScanMemory:
         self._forced: frozenset[Key] = frozenset()
         self._on_forces: list[Callable[[], None]] = []
         self._before: dict[Key, Value] = {}
-        """What stood where the recorded scan that is still to come has written already."""
+        """Former values of variables that the next recorded scan has written already."""
 
     @property
     def carried(self) -> tuple[object, ...]:
-        """What was left by scans before, but for what the next full scan tells again."""
+        """The state left by earlier scans, except what the next full scan records again."""
         return sorted(self.apart.items()), sorted(self._before.items())
 
     def view(self, name: str) -> int:
@@ -74,15 +74,15 @@ class ScanMemory:
         return (view, 0) in self._forced
 
     def under_force(self, view: int) -> Value:
-        """Return what the recorded scan found under a force."""
+        """Return the value that the recorded scan found under a force."""
         return self.read_now(view)
 
     def watch_forces(self, changed: Callable[[], None]) -> None:
-        """Call ``changed`` whenever another set of forces holds for a scan than for the one before."""
+        """Call ``changed`` whenever the set of forces for a scan differs from that for the previous one."""
         self._on_forces.append(changed)
 
     def plan(self, views: Sequence[int]) -> LatchPlan:
-        """Remember what the task latches."""
+        """Remember the views that the task latches."""
         self._views = tuple(views)
         self._positions = {view: position for position, view in enumerate(self._views)}
         self._recorded = [0] * len(self._views)
@@ -90,11 +90,11 @@ class ScanMemory:
         return latch_plan(views)
 
     def forget_latch(self) -> None:
-        """Scans are missing: what the task latched last is not known any more."""
+        """Forget the latched values, after scans that are missing."""
         self._untold = set(range(len(self._views)))
 
     def follow(self, scan: Scan) -> None:
-        """Take over what a scan newly latched; to be called for each scan, executed or not.
+        """Apply the newly latched values of a scan; to be called for each scan, executed or not.
 
         Raises:
             BagError: the scan does not fit the variables of the rack.
@@ -111,20 +111,20 @@ class ScanMemory:
 
     @property
     def is_uniform(self) -> bool:
-        """Whether all that a scan sees is what the recorded one latched and read."""
+        """Whether the inputs of a scan are exactly the values that the recorded one latched and read."""
         return not (self._untold or self.apart or self._before or self._forced)
 
     @property
     def latched_last(self) -> Sequence[Value]:
-        """What the task latched last."""
+        """The values that the task latched last."""
         return self._recorded
 
     def follow_skipped(self, latched: Sequence[Value]) -> None:
-        """Take over what the last of the scans latched that were executed elsewhere."""
+        """Apply the values that the last scan executed by columns latched."""
         self._recorded[:] = latched
 
     def begin(self, scan: Scan) -> None:
-        """Prepare for the execution of a scan that ``follow`` was told of.
+        """Prepare for the execution of a scan, after ``follow``.
 
         Raises:
             BagError: the scan does not fit the variables of the rack.
@@ -147,7 +147,7 @@ class ScanMemory:
                 changed()
 
     def latch(self, plan: LatchPlan) -> Latched:  # noqa: ARG002
-        """Return what the recorded scan latched, and of what only this task latches or has changed, what it sees."""
+        """Return the recorded latch, with this task's own values for variables that only it latches or has changed."""
         if not self._untold and not self.apart:
             return tuple(self._recorded)
         values = list(self._recorded)
@@ -161,14 +161,14 @@ class ScanMemory:
         return tuple(values)
 
     def read_now(self, view: int, element: int = 0) -> Value:
-        """Return what the scan sees now."""
+        """Return the present value as the scan sees it."""
         key = (view, element)
         number = self._read_count
         if self._in_step:
             self._read_count = number + 1
             self._in_step = number < len(self._reads) and self._reads[number][:2] == key
         if self._in_step and not self._edited and key not in self.apart:
-            return self._reads[number][2]  # others may have written since the scan itself did
+            return self._reads[number][2]  # others may have written since the scan's own write
         if key in self._own:
             return self._own[key]
         if key in self.apart:
@@ -185,7 +185,7 @@ class ScanMemory:
         element: int = 0,
         kind: WriteKind = WriteKind.BASIC,  # noqa: ARG002
     ) -> None:
-        """Keep what a BASIC statement writes."""
+        """Keep the write of a BASIC statement."""
         self._take(view, element, value)
         number = self._write_count
         self._write_count = number + 1
@@ -197,15 +197,15 @@ class ScanMemory:
                 self._in_step = False
 
     def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:  # noqa: ARG002
-        """Keep what blocks changed."""
+        """Keep the changes by blocks."""
         for view, value in changes:
             self._take(view, 0, value)
 
     def finish(self, commits: Sequence[tuple[int, Value]]) -> list[tuple[Key, Value, Value]]:
-        """End a scan; return what differs from the recorded memory now: key, recorded and replayed value.
+        """End a scan; return the differences from the recorded memory: key, recorded and replayed value.
 
         Raises:
-            UnknownValue: a value is needed that the recording has not told.
+            UnknownValue: a value is needed that is not in the recording.
         """
         if not self.apart and self.writes_agree and self._commits_agree(commits):
             self._before.clear()
@@ -231,45 +231,45 @@ class ScanMemory:
 
     @property
     def writes_agree(self) -> bool:
-        """Whether the scan's BASIC statements wrote just what the recorded ones did, in the same order."""
+        """Whether the scan's BASIC statements made exactly the recorded writes, in the same order."""
         return self._in_step and self._write_count == len(self._writes)
 
     @property
     def recorded_writes(self) -> list[Entry]:
-        """What the recorded scan's BASIC statements wrote, in their order."""
+        """The writes of the recorded scan's BASIC statements, in their order."""
         return self._writes
 
     def after_recorded(self, key: Key) -> Value:
         """Return a value as it was after the recorded scan.
 
         Raises:
-            UnknownValue: the recording has not told it.
+            UnknownValue: it has not been recorded.
         """
         changes = self._recorded_changes()
         return changes[key] if key in changes else self._commons.value(key)
 
     @property
     def is_apart(self) -> bool:
-        """Whether a write of somebody else matters to what the task finds."""
+        """Whether writes of others affect the values that the task reads."""
         return bool(self.apart or self._before)
 
     def overwritten(self, entries: Iterable[Entry]) -> None:
-        """Somebody else has written: what the task wrote there before is gone."""
+        """Discard the task's own values where another writer has written."""
         for view, element, _ in entries:
             self.apart.pop((view, element), None)
             self._before.pop((view, element), None)
 
     def written_early(self, key: Key) -> None:
-        """The recorded scan that is still to come is about to write a value in the log: remember what stands there."""
+        """Remember the present value before a write in the log by the next recorded scan."""
         if self._edited and key not in self._before and self._commons.is_known(key):
             self._before[key] = self._commons.value(key)
 
     def _told(self, key: Key) -> Value:
-        """Return what the recording tells of a value, without what the recorded scan itself has written by now."""
+        """Return the recorded value, without the writes that the recorded scan itself has made already."""
         return self._before[key] if key in self._before else self._commons.value(key)
 
     def _take(self, view: int, element: int, value: Value) -> None:
-        """Keep what the scan writes, and what else shows the same registers; a force keeps its value."""
+        """Keep a write of the scan, and its effect on other views of the same registers; forces keep their values."""
         if (view, element) in self._commons.forced:
             return
         if view in self._commons.registers.views:
@@ -278,7 +278,7 @@ class ScanMemory:
             self._own[view, element] = value
 
     def _recorded_changes(self) -> dict[Key, Value]:
-        """Return what the recorded scan changed: its writes, and what else shows the same registers."""
+        """Return the changes by the recorded scan: its writes, and those of other views of the same registers."""
         commons, changes = self._commons, dict[Key, Value]()
 
         def read(view: int, element: int) -> Value:
@@ -295,14 +295,14 @@ class ScanMemory:
         return changes
 
     def _spread(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> dict[Key, Value]:
-        """Return what a write of registers changes: them, and what else shows them; a force keeps its value."""
+        """Return the changes by a write of registers, with other views of the same ones; forces keep their values."""
         registers, forced = self._commons.registers, self._commons.forced
         value = registers.keeping(view, element, value, forced, read)
         others = {entry[:2]: entry[2] for entry in registers.consequences(view, element, value, read)}
         return {**{key: shown for key, shown in others.items() if key not in forced}, (view, element): value}
 
     def _present(self, view: int, element: int) -> Value:
-        """Return a value as the task has left it, else as the recording has it."""
+        """Return a value as the task left it, else as recorded."""
         key = (view, element)
         if key in self._own:
             return self._own[key]

@@ -1,4 +1,4 @@
-"""What a replay found, frozen: for the person as text, for programs as JSON."""
+"""The report of a replay, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ OPEN_LOOP = (
     "ROS and from the plant stay those that were recorded."
 )
 _LONGEST_LIST = 40
-"""Most inputs of one scan that the text shows."""
+"""Most inputs of one scan in the text."""
 
 
 class Kind(enum.Enum):
-    """What differs."""
+    """The kind of a difference."""
 
     VARIABLE = "variable"
     WRITES = "writes"
@@ -45,7 +45,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Greatest:
-    """The greatest difference (replayed - recorded) of a number, and the scan where it first occurs."""
+    """The greatest difference (replayed - recorded) of a number, and the scan in which it first occurs."""
 
     scan: int
     time_s: float
@@ -54,9 +54,9 @@ class Greatest:
 
 @dataclass(frozen=True)
 class Settled:
-    """From this scan on, up to the end, the difference stays from ``low`` to ``high``; both 0: equal again.
+    """From this scan to the end, the difference stays between ``low`` and ``high``; both 0: equal again.
 
-    For booleans and strings both are 1 where the values differ in every scan.
+    For booleans and strings both are 1 if the values differ in every scan.
     """
 
     scan: int
@@ -67,9 +67,10 @@ class Settled:
 
 @dataclass(frozen=True)
 class Difference:
-    """Something of one task that differs in at least one scan; ``lines`` are the BASIC lines that can write it.
+    """A variable or other item of one task that differs in at least one scan.
 
-    ``scans`` is the number of scans after which it differs (for a state: the recorded states).
+    ``lines`` are the BASIC lines that can write it. ``scans`` is the number of scans after which it differs (for a
+    state: of recorded states).
     """
 
     task: str
@@ -93,7 +94,7 @@ class NamedValue:
 
 @dataclass(frozen=True)
 class FirstScan:
-    """The first of all scans that differ, with what it saw: the latched values and the reads in their order."""
+    """The first of all scans that differ, with its inputs: the latched values and the reads in their order."""
 
     task: str
     scan: int
@@ -105,9 +106,9 @@ class FirstScan:
 
 @dataclass(frozen=True)
 class TaskReport:
-    """One task: where its source came from, how many scans and states were compared, and how many differ.
+    """One task: the origin of its source, the numbers of scans and states compared, and of those that differ.
 
-    ``scans`` counts the part before SCAN_LOOP too, as scan 0. ``notes`` tell what the person should know besides.
+    ``scans`` includes the part before SCAN_LOOP, as scan 0. ``notes`` are further information for the user.
     """
 
     name: str
@@ -141,7 +142,7 @@ class ReplayReport:
 
     @property
     def scans(self) -> int:
-        """How many scans were compared."""
+        """Number of compared scans."""
         return sum(task.scans for task in self.tasks)
 
     def as_json(self) -> dict[str, object]:
@@ -152,7 +153,7 @@ class ReplayReport:
         return plain
 
     def text(self) -> str:
-        """Return the report as the person reads it."""
+        """Return the report as text."""
         return "\n".join(_lines(self)) + "\n"
 
 
@@ -266,7 +267,7 @@ def _seconds(value: float) -> str:
 
 
 def errors_text(errors: Sequence[tuple[int, int]]) -> str:
-    """Return the run-time errors of a scan: ``line 150 AMX7003 division by zero``; line 0 where it does not count."""
+    """Return the run-time errors of a scan: ``line 150 AMX7003 division by zero``; a line of 0 is left out."""
     return ", ".join(_error_text(line, code) for line, code in errors) or "none"
 
 
@@ -277,7 +278,7 @@ def _error_text(line: int, code: int) -> str:
 
 
 def _wrapped(title: str, parts: Sequence[str], width: int = 110) -> Iterator[str]:
-    """Lines of ``title: a, b, c``, broken between parts."""
+    """Yield the lines of ``title: a, b, c``, broken between parts."""
     line = title
     for number, part in enumerate(parts):
         piece = part if number == len(parts) - 1 else f"{part}, "

@@ -1,4 +1,4 @@
-"""Recorded states of tasks: taken over whole, or field by field into an edited task; compared bit for bit."""
+"""Recorded states of tasks: restored whole, or field by field into an edited task; compared bit for bit."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from automax_ros.runtime.scan.error_log import LOG_FIELD, LOG_NUMBERS
 from automax_ros.runtime.tasks.task import Task
 
 _STRING = "$"
-"""Only locals are strings: their names tell."""
+"""Type character of strings; only locals can be strings in a state."""
 
 
 @dataclass(frozen=True)
 class Takeover:
-    """A state for a task's layout; ``initial`` are the fields that no recorded one fits."""
+    """A state for a task's layout; ``initial`` are the fields without a fitting recorded one."""
 
     values: list[Value]
     initial: tuple[str, ...]
@@ -33,7 +33,7 @@ def recorded_fields(bag: Path, state: TaskState) -> dict[str, tuple[Value, ...]]
     """Return the values of a state by field.
 
     Raises:
-        BagError: its lists do not fit together.
+        BagError: its lists are inconsistent.
     """
     _check_lengths(bag, state)
     texts = iter(state.text)
@@ -52,7 +52,7 @@ def recorded_fields(bag: Path, state: TaskState) -> dict[str, tuple[Value, ...]]
 
 
 def whole_state(bag: Path, layout: Layout, state: TaskState) -> Takeover:
-    """Return a state for the layout that it was made with, each value brought back to its type later.
+    """Return a state for the layout that it was recorded with, each value in its field's type.
 
     Raises:
         BagError: it does not fit the layout.
@@ -67,12 +67,12 @@ def whole_state(bag: Path, layout: Layout, state: TaskState) -> Takeover:
 def fitting_state(
     bag: Path, layout: Layout, state: TaskState, before: Layout | None, fresh: Mapping[str, Value]
 ) -> Takeover:
-    """Return a state for an edited task: by name what fits (type and size), the rest at its initial value.
+    """Return a state for an edited task: recorded fields that fit by name, type and size, the others initial values.
 
-    ``before`` is the layout of the recorded task, if it is known. ``fresh`` are fields that keep a value of their own.
+    ``before`` is the layout of the recorded task, if it is known. ``fresh`` are fields that get these values instead.
 
     Raises:
-        BagError: the state's lists do not fit together.
+        BagError: the state's lists are inconsistent.
     """
     fields = recorded_fields(bag, state)
     known = {field.name: field for field in before.fields} if before else {}
@@ -90,7 +90,7 @@ def fitting_state(
 
 
 def _fitting(field: StateField, values: tuple[Value, ...] | None, old: StateField | None) -> list[Value] | None:
-    """The recorded values of a field in its own type, None if they do not fit it."""
+    """Return the recorded values of a field in its own type, None if they do not fit it."""
     if values is None or len(values) != field.size:
         return None
     if old is not None and (old.type, old.dimensions) != (field.type, field.dimensions):
@@ -109,7 +109,7 @@ def _typed(bag: Path, state: TaskState, field: StateField, values: Sequence[Valu
 
 
 def state_differences(bag: Path, task: Task, state: TaskState) -> list[tuple[str, Value, Value]]:
-    """Return the fields in which a task's state is not the recorded one: name, recorded and own value.
+    """Return the fields in which a task's state differs from the recorded one: name, recorded and own value.
 
     An array's name has the index of the value.
 
@@ -142,10 +142,10 @@ def state_differences(bag: Path, task: Task, state: TaskState) -> list[tuple[str
 
 
 def held_in(bag: Path, task: Task, state: TaskState) -> dict[str, Value]:
-    """Return the locals that a force holds after a state, with their values, as far as the task has them.
+    """Return the locals that are forced after a state, with their values, as far as the task has them.
 
     Raises:
-        BagError: the state's lists do not fit together, or a value is none that the local can have.
+        BagError: the state's lists are inconsistent, or a value is one that the local cannot have.
     """
     names = [name.removeprefix(HELD_MARK) for name in state.field if name.startswith(HELD_MARK)]
     if not names:
@@ -160,7 +160,7 @@ def held_in(bag: Path, task: Task, state: TaskState) -> dict[str, Value]:
 
 
 def log_is_empty(state: TaskState) -> bool:
-    """Return whether a state tells that the error log is empty."""
+    """Return whether the error log is empty in a state."""
     return list(state.field[-1:]) == [LOG_FIELD] and not any(state.value[-LOG_NUMBERS:])
 
 
@@ -170,10 +170,10 @@ def tunable_names(layout: Layout) -> list[str]:
 
 
 def places_of(bag: Path, state: TaskState, names: Sequence[str]) -> dict[str, int]:
-    """Return where the single numbers of these names stand in a state's values.
+    """Return the places of the single numbers of these names in a state's values.
 
     Raises:
-        BagError: the state's lists do not fit together.
+        BagError: the state's lists are inconsistent.
     """
     _check_lengths(bag, state)
     places: dict[str, int] = {}
@@ -186,7 +186,7 @@ def places_of(bag: Path, state: TaskState, names: Sequence[str]) -> dict[str, in
 
 
 def current_values(program: Program | None) -> dict[str, Value]:
-    """Return what the source gives each tunable at installation (CURRENT=)."""
+    """Return the value that each tunable has at installation (CURRENT=)."""
     symbols = program.symbols.values() if program else ()
     return {symbol.name: symbol.tuning.current for symbol in symbols if symbol.tuning is not None}
 

@@ -1,6 +1,6 @@
-"""The rack of a recording, built from nothing but the recording: its YAML file and its sources are stored inside.
+"""The rack of a recording, built from the YAML file and the sources that are stored inside.
 
-What is stored is untrusted: sizes and numbers are bounded, no name from inside becomes a path, no file is touched.
+Stored files are untrusted: sizes and numbers are bounded, no name in them becomes a path, no file is accessed.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ class SourceRefused(Exception):
 
 @dataclass(frozen=True)
 class ReplaySource:
-    """A task that is executed again.
+    """The source of a replayed task.
 
-    ``compiled`` is what runs; ``recorded`` is what ran when the recording was made, None if that cannot be told;
-    ``edited`` says whether it runs in place of what ran. ``versions`` are all sources that ran, by their hash: a task
-    may have been reloaded. An edited source runs in place of each of them (decision). ``keeps_locals``: over STOP ALL
-    too.
+    ``compiled`` runs in the replay; ``recorded`` is the task that ran when the recording was made, None if that is
+    unknown; ``edited``: ``compiled`` replaces it. ``versions`` are all sources that ran, by hash: a task may have
+    been reloaded. An edited source runs in place of each of them (decision). ``keeps_locals``: locals are kept over
+    STOP ALL.
     """
 
     name: str
@@ -67,14 +67,14 @@ class ReplaySource:
     keeps_locals: bool = True
 
     def reloaded(self, source_hash: str) -> ReplaySource | None:
-        """Return what is executed after a reload with a source of this hash, None if it is not stored inside."""
+        """Return the source to execute after a reload with a source of this hash, None if it is not stored inside."""
         recorded = self.versions.get(source_hash)
         if recorded is None:
             return None
         return replace(self, recorded=recorded, compiled=self.compiled if self.edited else recorded)
 
     def edit_notes(self) -> list[str]:
-        """Say what the person should know of the edit."""
+        """Return notes for the user about the edit."""
         if not self.edited:
             return []
         if self.recorded is None:
@@ -93,7 +93,7 @@ class ReplaySource:
 
 @dataclass(frozen=True)
 class StoredRack:
-    """What a recording stores with its messages; ``sources`` are those that ran when it began, ``later`` the others."""
+    """The rack file and sources in a recording; ``sources`` are those that ran when it began, ``later`` the others."""
 
     bag: Path
     config: RackConfig
@@ -102,11 +102,11 @@ class StoredRack:
 
     @property
     def task_names(self) -> list[str]:
-        """All tasks of the rack, as its file lists them."""
+        """All tasks of the rack, in the order of its file."""
         return [task.name for _, task in self.config.placed_tasks]
 
     def require_tasks(self, names: Iterable[str]) -> None:
-        """Make sure that the rack has these tasks.
+        """Check that the rack has these tasks.
 
         Raises:
             BagError: it lacks one.
@@ -140,7 +140,7 @@ class StoredRack:
                 refused.append((source, result.diagnostics))
                 continue
             compiled = compile_program(result.program, views)
-            # What is given runs in place of all that ran, also where it is what ran before a reload.
+            # A given source runs in place of all that ran, even if it equals the one before a reload.
             edited = stored is None or name in new
             recorded: CompiledTask | None = compiled
             if edited:
@@ -181,7 +181,7 @@ class StoredRack:
         return [result.program for result in checked if result.program is not None]
 
     def check_table(self, table: VariableTable) -> None:
-        """Make sure that the recording numbers its variables as its own rack file does.
+        """Check that the recording numbers its variables as its own rack file does.
 
         Raises:
             BagError: it does not.
@@ -196,7 +196,7 @@ class StoredRack:
 
 
 def stored_rack(reader: BagReader) -> StoredRack:
-    """Read what a recording stores inside: as attachments, of which each file has all, or as the rack's own message.
+    """Read the rack stored in a recording: as attachments, of which each file has all, or as the rack's own message.
 
     Raises:
         BagError: there is no rack file inside, or it is too large, or the recording cannot be read.
@@ -227,7 +227,7 @@ def stored_rack(reader: BagReader) -> StoredRack:
 
 
 def unknown_value(bag: Path, source: ReplaySource, variable: CommonVariable, when: str) -> BagError:
-    """Return the error of a variable that a task reads and the recording has not told before a time."""
+    """Return the error for a variable that a task reads and whose value is not in the recording before a time."""
     symbol = source.compiled.program.symbols.get(variable.name)
     place = f"{source.source.name}:{symbol.span.line}" if symbol else source.source.name
     return BagError(
@@ -239,7 +239,7 @@ def unknown_value(bag: Path, source: ReplaySource, variable: CommonVariable, whe
 
 
 class _StoredFiles:
-    """The rack file of a recording, empty until it comes, and the sources of its tasks, each text once."""
+    """Collects the rack file of a recording, empty at first, and the sources of its tasks, each text once."""
 
     def __init__(self, bag: Path) -> None:
         self.rack_file = ""

@@ -1,7 +1,4 @@
-"""One task of a recording, executed again scan by scan.
-
-Executes one recorded scan again.
-"""
+"""Executes the recorded scans of one task again, scan by scan."""
 
 from __future__ import annotations
 
@@ -28,10 +25,10 @@ from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, S
 
 
 def execute(bag: Path, task: Task, scan: Scan, now_ns: int) -> ScanRecord | None:
-    """Execute a scan at an instant of rack time; None if the task does not run any more.
+    """Execute a scan at an instant of rack time; None if the task no longer runs.
 
     Raises:
-        BagError: with the recorded state it cannot be executed; no task can have come to such a state.
+        BagError: it cannot be executed with the recorded state, which no task can have.
     """
     try:
         if scan.scan == 0:
@@ -45,7 +42,7 @@ def execute(bag: Path, task: Task, scan: Scan, now_ns: int) -> ScanRecord | None
 
 
 def _overlap(task: Task, scan: Scan, now_ns: int) -> ScanRecord | None:
-    """Fault the task where the recorded one was faulted by its time: no execution of a source tells that."""
+    """Fault the task where the recorded one was faulted for its time, which no execution of a source can show."""
     code = next((error.code for error in scan.errors if error.code in (OVERLAP, EVENT_TIMEOUT)), None)
     return None if code is None else task.fault(code, now_ns)
 
@@ -53,14 +50,14 @@ def _overlap(task: Task, scan: Scan, now_ns: int) -> ScanRecord | None:
 _MOST_NAMES = 8
 _STOPPED_KEY = "status"
 _QUIET_SCANS = 2
-"""A task that has not scanned for more periods than this does not run any more."""
+"""A task that has not scanned for more periods than this no longer runs."""
 
 
 class TaskReplay:
-    """Executes the scans of one task again and hands what differs to the tallies.
+    """Executes the scans of one task again and counts differences in ``tallies``.
 
-    ``starts_at`` is the log time of the TaskState to begin with; None begins with the first that comes, or with the
-    task's start.
+    ``starts_at`` is the log time of the TaskState to begin with; None begins with the first one, or with the task's
+    start.
     """
 
     def __init__(
@@ -100,16 +97,16 @@ class TaskReplay:
         self._take_up(source)
 
     def totals(self) -> TaskTotals:
-        """Return what became of the task so far."""
+        """Return the totals of the task so far."""
         source = self._source.source.name if self._source.edited else "as recorded"
         counts = self._compared, self._different, self._states, self._left_out
         return TaskTotals(self.name, source, self._source.edited, *counts, tuple(self._notes))
 
     @property
     def carried(self) -> tuple[object, ...]:
-        """What of its past decides on scans to come, but for what a run that begins at a file cannot know.
+        """The state that determines later scans, except what a run that begins with a file cannot know.
 
-        What that is, and why it does not matter, ``joining`` says.
+        ``carried_state`` lists that, and says why it does not matter.
         """
         task, edited = self._task, self._source.edited
         state = task.snapshot(), sorted(task.forces.items()), task.scan_number
@@ -126,12 +123,12 @@ class TaskReplay:
 
     @property
     def stopped(self) -> bool:
-        """Whether it does not run any more."""
+        """Whether the task no longer runs."""
         return self._task.status is not Status.RUNNING or self._stopped_in is not None
 
     @property
     def edited(self) -> bool:
-        """Whether another source runs than the recorded one."""
+        """Whether a different source runs than the recorded one."""
         return self._source.edited
 
     @property
@@ -143,14 +140,14 @@ class TaskReplay:
     def end_in_doubt(self) -> bool:
         """Whether only one of the recorded task and an edited one seems to have ended after the last scan.
 
-        The recording does not tell why a task no longer scans; its own source, executed again, does.
+        The recording does not show why a task no longer scans; executing its own source again does.
         """
         if not self._source.edited or self._source.recorded is None or not self._synchronous:
             return False
         return self._stopped_in is not None or (self._recorded_ended and self._task.status is Status.RUNNING)
 
     def compare_end(self, recorded_in: int | None) -> None:
-        """Compare the task's end with the recorded source's: the scan in which that stops by itself, None if never."""
+        """Compare the end with that of the recorded source, which stops by itself in this scan, None if never."""
         own_in = self._stopped_in
         if own_in == recorded_in or self._last is None:
             return
@@ -171,7 +168,7 @@ class TaskReplay:
         Returns whether it could be executed.
 
         Raises:
-            BagError: it does not fit the rack, or needs a value that the recording has not told.
+            BagError: it does not fit the rack, or needs a value that is not in the recording.
         """
         self._follow(scan)
         if not self._synchronous:
@@ -198,7 +195,7 @@ class TaskReplay:
 
     @property
     def task(self) -> Task:
-        """The task that is executed again."""
+        """The replayed task."""
         return self._task
 
     @property
@@ -208,14 +205,14 @@ class TaskReplay:
 
     @property
     def is_uniform(self) -> bool:
-        """Whether all that its next scans depend on is what they latch and read, and nothing has differed so far."""
+        """Whether its next scans depend only on their latched and read values, and nothing has differed so far."""
         program = self._task.compiled.program
         scans_here = not (program.is_basic or program.cml is not None or self._task.forces or self.stopped)
         follows = self._synchronous and self._starts_at is None and self.beginning.is_settled
         return scans_here and follows and self.memory.is_uniform and self._tallies.is_clean(self.name)
 
     def skip(self, skipped: Skipped) -> None:
-        """Take over that scans were executed elsewhere, from the task's state on, and differ in nothing."""
+        """Account for scans that were executed by columns, from the task's state on, without a difference."""
         self.memory.follow_skipped(skipped.latched)
         for scan, line, code in skipped.errors:
             self._task.scan_number = scan
@@ -226,9 +223,9 @@ class TaskReplay:
         self._compared += skipped.count if skipped.counted else 0
 
     def take_state(self, state: TaskState, log_time: int, *, counted: bool) -> None:
-        """Begin with a recorded state, or compare it with ours; what an operator has done since is done here too.
+        """Begin with a recorded state, or compare it with ours; repeat what an operator has done since.
 
-        Between two scans a state changes by operations alone: a tunable was set, a local forced, the error log
+        Between two scans a state changes only by operations: a tunable was set, a local forced, the error log
         cleared, the task installed again.
 
         Raises:
@@ -266,16 +263,16 @@ class TaskReplay:
             self._compare_state(state)
 
     def take_own(self, write: CommonWrite) -> None:
-        """Note what a modeled scan wrote before it ended, and so before it stands in the log."""
+        """Record a write that a modeled scan made before it ended, and so before the scan is in the log."""
         self.beginning.asks_back(self._source.edited)
         if write.kind == WriteKind.BASIC and write.stamp > self._last_end:
             for key in zip(write.values.variable, write.values.element, strict=False):
                 self.memory.written_early(key)
 
     def take_operation(self, operation: Operation) -> None:
-        """Remember that the task was installed again: its next state is then no work of its scans.
+        """Remember if the task was installed again: its next state does not result from its scans then.
 
-        Where the module of the task loses locals, they are lost here too.
+        If the task's module loses locals, they are cleared here, too.
         """
         if operation.ok and operation.what in ("stop_all", "power_off") and not self._source.keeps_locals:
             self._task.lose_locals()
@@ -283,7 +280,7 @@ class TaskReplay:
         self._installed_again |= operation.ok and operation.task in ("", self.name) and installs
 
     def _follow(self, scan: Scan) -> None:
-        """Keep up with the numbers of scans and with what is latched."""
+        """Follow the numbers of scans and the latched values."""
         self.beginning.scans(scan)
         if scan.scan == 0:
             first = self._last is None and self._starts_at is None
@@ -305,7 +302,7 @@ class TaskReplay:
         self.memory.follow(scan)
 
     def _execute(self, scan: Scan) -> ScanRecord | None:
-        """Execute a scan; None if the task does not run any more."""
+        """Execute a scan; None if the task no longer runs."""
         if scan.scan == 0:
             self._stopped_in = None
         # Rack time: on the wall clock stamps are the time of day.
@@ -323,7 +320,7 @@ class TaskReplay:
         self._different += bool(found)
 
     def _count_stopped(self, scan: Scan) -> None:
-        """The recorded task goes on where the replayed one has stopped."""
+        """Count a scan of the recorded task after the replayed one has stopped."""
         if self._stopped_in is None:
             return
         reason = self._end_text()
@@ -338,7 +335,7 @@ class TaskReplay:
         return f"faulted: {fault}" if fault else "ended by STOP"
 
     def _adopt(self, state: TaskState) -> None:
-        """Go on from a recorded state."""
+        """Continue from a recorded state."""
         same_layout = not self._source.edited and state.layout_hash == self._layout_hash
         if same_layout:
             taken = whole_state(self._bag, self._layout, state)
@@ -364,13 +361,13 @@ class TaskReplay:
         self._synchronous = True
 
     def _follow_forces(self, state: TaskState) -> None:
-        """Hold the locals that are forced from this state on, and release the others."""
+        """Force the locals that are forced from this state on, and release the others."""
         held = held_in(self._bag, self._task, state)
         if held != self._task.forces:
             self._task.hold(held)
 
     def _take_up(self, source: ReplaySource) -> None:
-        """Execute a source from now on; its states are those of what ran when it was recorded."""
+        """Execute a source from now on; recorded states are those of ``source.recorded``."""
         self._source = source
         self._comparison.take_up(source)
         self._layout = self._task.layout
@@ -383,7 +380,7 @@ class TaskReplay:
         self._tunables = Tunables(self._bag, source, self._recorded_layout or self._layout, self._note, self._when)
 
     def _follow_source(self, state: TaskState) -> bool:
-        """Go on with the source that a state tells of; return whether it is stored inside. BagError: none ever was."""
+        """Switch to the source of a state; return whether it is stored inside. BagError: none of the task's was."""
         recorded = self._source.recorded
         ran = recorded is None or state.source_hash == recorded.program.source_hash
         reloaded = None if ran else self._source.reloaded(state.source_hash)
@@ -405,7 +402,7 @@ class TaskReplay:
         return ran
 
     def _lose(self, scan: Scan, error: UnknownValue) -> None:
-        """A value is missing: after a gap in the write log the task waits for a state, otherwise that is an error."""
+        """Handle a missing value: after a gap in the write log wait for a state, otherwise raise an error."""
         variable = self._commons.rack[error.key[0]]
         if not self._commons.gaps:
             raise unknown_value(self._bag, self._source, variable, self._when(scan.stamp)) from error

@@ -1,4 +1,4 @@
-"""What a replay has counted, over the whole recording or a part of it; parts are added up."""
+"""The totals of a replay, over the whole recording or a part of it; those of parts are added up."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from automax_ros.replay.scans.report import Difference, FirstScan, TaskReport
 
 MOST_NOTES = 200
-"""Notes about one task that are kept; a report shows the first of them."""
+"""Most notes about one task that are kept; a report shows the first of them."""
 _NOTES_SHOWN = 20
 
 
@@ -26,12 +26,12 @@ class TaskTotals:
     notes: tuple[str, ...]
 
     def since(self, base: TaskTotals) -> TaskTotals:
-        """Return what was counted after ``base``."""
+        """Return the totals since ``base``."""
         notes = tuple(note for note in self.notes if note not in base.notes)
         return self._counted(base, -1, notes)
 
     def and_then(self, other: TaskTotals) -> TaskTotals:
-        """Return this and what was counted later."""
+        """Return the sum of these totals and later ones."""
         notes = tuple(dict.fromkeys((*self.notes, *other.notes)))[:MOST_NOTES]
         return self._counted(other, 1, notes)
 
@@ -59,9 +59,9 @@ class TaskTotals:
 
 @dataclass(frozen=True)
 class Totals:
-    """All tasks by their names, and what differs.
+    """The totals of all tasks by name, and the differences.
 
-    ``first_stamp`` is that of the first message, ``last_stamp`` that of the last scan; None before there was one.
+    ``first_stamp`` is that of the first message, ``last_stamp`` that of the last scan; None before there is one.
     """
 
     first_stamp: int | None
@@ -78,11 +78,11 @@ class Totals:
 
     @property
     def full(self) -> bool:
-        """Whether there are as many notes as are kept: some may have been left out."""
+        """Whether a task has the most notes that are kept: some may have been dropped."""
         return any(len(task.notes) >= MOST_NOTES for task in self.tasks.values())
 
     def since(self, base: Totals) -> Totals:
-        """Return what was counted after ``base``, in which nothing differs."""
+        """Return the totals since ``base``, in which nothing differs."""
         return replace(self, tasks={name: task.since(base.tasks[name]) for name, task in self.tasks.items()})
 
     def forgetting_notes(self) -> Totals:
@@ -90,7 +90,7 @@ class Totals:
         return replace(self, tasks={name: replace(task, notes=()) for name, task in self.tasks.items()})
 
     def and_then(self, other: Totals) -> Totals:
-        """Return this, in which nothing differs, and what was counted later."""
+        """Return the sum of these totals, in which nothing differs, and later ones."""
         return replace(
             other,
             first_stamp=self.first_stamp if self.first_stamp is not None else other.first_stamp,
@@ -100,7 +100,7 @@ class Totals:
 
 
 def added_up(parts: Iterable[Totals]) -> Totals:
-    """Return what parts have counted together, in their order; there is at least one."""
+    """Return the sum of the totals of parts, at least one, in their order."""
     first, *others = parts
     for part in others:
         first = first.and_then(part)

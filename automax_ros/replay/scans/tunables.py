@@ -1,4 +1,4 @@
-"""Tunables in a replay: what the operator set during the recording is set again, an edited CURRENT holds until then."""
+"""Tunables in a replay: values set by the operator are set again; until then an edited CURRENT holds."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from automax_ros.runtime.tasks.task import Task
 
 
 class Tunables:
-    """The tunables of one task as its recorded states tell them; ``layout`` is the recorded one.
+    """The tunables of one task, from its recorded states; ``layout`` is the recorded one.
 
-    ``note`` takes what the person should know, ``when`` turns a stamp into the text of a time.
+    ``note`` is called with notes for the user, ``when`` converts a stamp to the text of a time.
     """
 
     def __init__(
@@ -42,13 +42,13 @@ class Tunables:
 
     @property
     def known(self) -> list[tuple[str, float]]:
-        """The values that the recording has told last, by name; as numbers of one kind, as states have them."""
+        """The last recorded values by name, all as float, as in states."""
         return sorted((name, float(value)) for name, value in self._known.items())
 
     def fresh(self, state: TaskState) -> dict[str, Value]:
-        """Return the tunables that an edited task does not take over from a state: those whose CURRENT was edited.
+        """Return the tunables that an edited task does not restore from a state: those whose CURRENT was edited.
 
-        One that the operator had set by then is taken over all the same.
+        One that the operator had set by then is restored nevertheless.
 
         Raises:
             BagError: the state does not fit the task.
@@ -65,7 +65,7 @@ class Tunables:
         return fresh
 
     def know(self, state: TaskState) -> None:
-        """Remember the values of a state that the task has taken over.
+        """Remember the values of a state that the task has restored.
 
         Raises:
             BagError: the state does not fit the task.
@@ -73,7 +73,7 @@ class Tunables:
         self._known.update(self._told(state))
 
     def set_again(self, task: Task, state: TaskState) -> None:
-        """Set what the operator has set since the state before.
+        """Set the tunables that the operator has set since the previous state.
 
         Raises:
             BagError: the state does not fit the task.
@@ -94,7 +94,7 @@ class Tunables:
                 self._note(what)
 
     def _told(self, state: TaskState) -> dict[str, float]:
-        """The tunables in a state; where they stand in it is looked up once."""
+        """Return the tunables in a state; their places are looked up once per layout."""
         if self._places is None or self._places[0] != state.layout_hash:
             self._places = (state.layout_hash, places_of(self._bag, state, self._names))
         try:
