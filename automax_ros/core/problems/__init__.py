@@ -7,7 +7,7 @@ files, racks and bags, 7 run time. If the hardware's own code is known it is giv
 
 from __future__ import annotations
 
-from automax_ros.core.problems import config, plant, runtime, semantics, stimuli, syntax, types
+from automax_ros.core.problems import language, racks
 from automax_ros.core.problems.problem import Problem, Severity
 
 __all__ = ["PROBLEMS", "Problem", "Severity"]
@@ -15,7 +15,7 @@ __all__ = ["PROBLEMS", "Problem", "Severity"]
 
 def _table() -> dict[str, Problem]:
     table: dict[str, Problem] = {}
-    for band in (syntax, types, semantics, config, plant, stimuli, runtime):
+    for band in (language, racks):
         for problem in band.PROBLEMS:
             if problem.code in table:
                 raise ValueError(f"problem code {problem.code} is defined twice")

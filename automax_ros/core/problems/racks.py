@@ -1,10 +1,10 @@
-"""Problems of files, racks and bags (6xxx)."""
+"""Problems of rack files, stimuli, recordings and old plants (6xxx), and of run time (7xxx)."""
 
 from __future__ import annotations
 
 from automax_ros.core.problems.problem import Problem, Severity
 
-PROBLEMS: tuple[Problem, ...] = (
+_FILES = (
     # rack files: the file and its YAML
     Problem("AMX6000", "rack file cannot be read"),
     Problem("AMX6001", "rack file too large"),
@@ -174,3 +174,82 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6915", "value that the variable cannot hold"),
     Problem("AMX6916", "value outside of the tuning limits"),
 )
+_TIMES_AND_OLD_PLANTS = (
+    # `automax load`
+    Problem("AMX6770", "tasks take more than all of a module's time", Severity.WARNING, hardware="14"),
+    Problem("AMX6771", "tasks of a UDC fit in no TICKS", hardware="14"),
+    Problem("AMX6773", "PC3000 that is not alone"),
+    Problem("AMX6774", "current minor loop that takes more than half of a sixth of a line cycle", Severity.WARNING),
+    Problem("AMX6788", "AC_LINE_FREQ above the frequency of the plant's line", Severity.WARNING),
+    Problem("AMX6772", "Executive older than the tables of execution times", Severity.WARNING),
+    # `automax import`: configuration tasks
+    Problem("AMX6780", "statement that no configuration task has"),
+    Problem("AMX6781", "malformed definition of a configuration task"),
+    Problem("AMX6782", "key of a definition"),
+    Problem("AMX6783", "value of a definition"),
+    Problem("AMX6784", "name that the configuration defines twice"),
+    Problem("AMX6785", "definition that cannot be an I/O point"),
+    Problem("AMX6786", "definition on a module that the emulator does not have", Severity.WARNING),
+    Problem("AMX6787", "task that the rack file leaves out", Severity.WARNING),
+)
+_STIMULI = (
+    Problem("AMX6730", "stimuli file cannot be read"),
+    Problem("AMX6731", "not an entry of a stimuli file"),
+    Problem("AMX6732", "unknown verb in a stimuli file"),
+    Problem("AMX6733", "verb that a task alone does not have"),
+    Problem("AMX6734", "time in a stimuli file"),
+    Problem("AMX6735", "name in a stimuli file"),
+    Problem("AMX6736", "value in a stimuli file"),
+    Problem("AMX6737", "variable that a verb cannot be used on"),
+    Problem("AMX6738", "frequency or amplitude in a stimuli file"),
+    Problem("AMX6739", "unknown task in a stimuli file"),
+    Problem("AMX6740", "source to reload"),
+    Problem("AMX6741", "tunable in a stimuli file"),
+    Problem("AMX6742", "module or plant without such a control"),
+    Problem("AMX6743", "too many entries in a stimuli file"),
+    Problem("AMX6744", "stimuli file without entries", Severity.WARNING),
+)
+_RUN_TIME = (
+    Problem("AMX7001", "output of a block clamped to 16 bits"),
+    Problem("AMX7002", "32-bit overflow inside a block"),
+    Problem("AMX7003", "division by zero inside a block"),
+    Problem("AMX7004", "coefficient out of its limits"),
+    Problem("AMX7005", "column that the data structure does not have"),
+    Problem("AMX7020", "value clamped on assignment to an INTEGER variable"),
+    Problem("AMX7021", "value clamped on assignment to a DOUBLE INTEGER variable"),
+    Problem("AMX7022", "value clamped on assignment to a REAL variable"),
+    Problem("AMX7023", "32-bit overflow in an expression"),
+    Problem("AMX7024", "division by zero in an expression"),
+    Problem("AMX7025", "argument of a function out of range"),
+    Problem("AMX7026", "subscript out of range"),
+    Problem("AMX7027", "STEP of a FOR statement is 0"),
+    Problem("AMX7028", "GOSUB nested more than 16 deep"),
+    Problem("AMX7029", "RETURN without GOSUB"),
+    Problem("AMX7030", "READ past the last DATA value"),
+    Problem("AMX7032", "DATA value of another kind than the variable"),
+    Problem("AMX7031", "bus error", hardware="31"),
+    Problem("AMX7040", "scan stopped: too many statements", hardware="14"),
+    Problem("AMX7070", "overlap: the last scan was still under way", hardware="14"),
+    Problem("AMX7071", "no event within its TIMEOUT"),
+    Problem("AMX7072", "two modules drive the common clock", hardware="38"),
+    Problem("AMX7050", "channel or port is not open"),
+    Problem("AMX7051", "another task reads the channel"),
+    Problem("AMX7052", "TYPE is not the channel's"),
+    Problem("AMX7053", "DEPTH of a channel out of range"),
+    Problem("AMX7054", "time of DELAY or START EVERY out of range"),
+    Problem("AMX7105", "dynamic input of a current minor loop out of range"),
+    Problem("AMX7106", "fixed input of a current minor loop out of range: the drive never runs"),
+    Problem("AMX7107", "IOC calculation error: IOC_THRESH is 1.8 LIM_BAR or more, the drive never runs"),
+    Problem("AMX7110", "drive fault: instantaneous overcurrent (IOC)"),
+    Problem("AMX7111", "drive fault: line sync lost"),
+    Problem("AMX7112", "drive fault: tach loss"),
+    Problem("AMX7113", "drive fault: overspeed or overvoltage (OSV)"),
+    Problem("AMX7114", "drive fault: external instantaneous electronic trip (IET)"),
+    Problem("AMX7115", "drive fault: incorrect phase rotation"),
+    Problem("AMX7116", "drive fault: shorted SCR", hardware="87"),
+    Problem("AMX7117", "register 4137 of a 57C406 is not twice register 4138"),
+    Problem("AMX7119", "drive fault: the hardware's overspeed circuit has tripped (OSV)"),
+    Problem("AMX7042", "deadline missed on the wall clock"),
+)
+
+PROBLEMS: tuple[Problem, ...] = (*_FILES, *_TIMES_AND_OLD_PLANTS, *_STIMULI, *_RUN_TIME)
