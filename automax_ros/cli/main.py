@@ -113,7 +113,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: list[str]) -> int:
-    from automax_ros.core.faults import UserError
+    from automax_ros.core.user_error import UserError
 
     name: str | None = None
     try:
@@ -176,7 +176,7 @@ def _hand_over(ros: RosArguments | None, arguments: argparse.Namespace) -> None:
     if hasattr(arguments, "ros"):
         arguments.ros = ros
     elif ros.given:
-        from automax_ros.cli.usage import UsageError
+        from automax_ros.core.user_error import UsageError
 
         raise UsageError(f"{ROS_ARGUMENTS}: this subcommand makes no ROS nodes", "leave it out")
 
@@ -244,8 +244,8 @@ def module_of(name: str) -> ModuleType:
 
 
 def _unknown(name: str) -> Exception:
-    from automax_ros.cli.usage import UsageError
     from automax_ros.core.text import did_you_mean, quoted
+    from automax_ros.core.user_error import UsageError
 
     hint = did_you_mean(name, SUBCOMMANDS) or f"there are {', '.join(SUBCOMMANDS)}"
     return UsageError(f"no subcommand {quoted(name)}", hint)

@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.types import DataType, Value
+from automax_ros.core.user_error import UserError
 from automax_ros.core.values import value_of, wanted
 
 AUTO_RUN = "AUTORUNSTATUS@"

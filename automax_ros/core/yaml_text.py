@@ -18,8 +18,8 @@ from typing import Any, TypeAlias
 import yaml
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
+from automax_ros.core.user_error import UserError
 
 MAX_DEPTH = 16
 """Deepest nesting (decision: a rack file needs 6, the description of a recording 7)."""

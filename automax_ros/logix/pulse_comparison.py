@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.declare.instance import Instance
 from automax_ros.blocks.discrete.pulse import PULSE_MULT
-from automax_ros.core.faults import UserError
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.ticks import DEFAULT_TICK_NS
 from automax_ros.core.types import Value
+from automax_ros.core.user_error import UserError
 from automax_ros.logix.pmul import GAIN_ONE, MIN_WORD_SIZE, PulseMultiplier
 
 DEFAULT_MULTIPLIER = 32768

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import printable
+from automax_ros.core.user_error import UserError
 
 MOST_TRIES = 2
 """How often a piece is begun whose worker dies under it (decision: whatever kills workers shall not kill them all)."""

@@ -9,9 +9,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.faults import UserError
 from automax_ros.core.json_schema import Schema
 from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.user_error import UserError
 from automax_ros.core.yaml_text import Flaw, Node, Scalar, YamlFault, read_yaml, yaml_of
 from automax_ros.core.yaml_text import Mapping as Keys
 from automax_ros.rackfile.model.config import RackConfig

@@ -23,8 +23,8 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.user_error import UserError
 from automax_ros.language.program import Program
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.model.config import RackConfig

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
+from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import StopCause
 from automax_ros.rack.operator.faults import displays_of
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonVariable
+from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.scan.error_log import ErrorLog, LogEntry
-from automax_ros.runtime.tasks.task import Status
+from automax_ros.runtime.scan.scan_record import ScanRecord
+from automax_ros.runtime.tasks.task import Status, Task
+from automax_ros.scenario.stimuli.reader import RACK_ONLY
 from automax_ros.scenario.stimuli.stage import OperationRecord
 
 STATUS_WORDS = {
@@ -93,3 +97,34 @@ def _operation(item: OperationRecord) -> dict[str, Any]:
     if item.of:
         found["of"] = item.of
     return {**found, "why": item.why} if not item.ok else found
+
+
+class OperationLog:
+    """An observer that keeps operations with the names of stimuli verbs, and all refused ones.
+
+    ``is_own`` returns whether stimuli are acting, which keep their own list. Faults are not operations.
+    """
+
+    def __init__(self, is_own: Callable[[], bool]) -> None:
+        """Create an empty log."""
+        self._is_own = is_own
+        self.happened: list[OperationRecord] = []
+
+    def operated(self, operation: Operation) -> None:
+        """Keep an operation that an operator has requested."""
+        is_fault = operation.what == "stop_all" and bool(operation.task or operation.detail)
+        if self._is_own() or is_fault or (operation.ok and operation.what not in RACK_ONLY):
+            return
+        name, assigned, _ = operation.detail.partition(" = ")
+        of = name if assigned or not operation.task else operation.task
+        why = "" if operation.ok else operation.reason
+        self.happened.append(OperationRecord(operation.at_ns, operation.what, of, operation.ok, why))
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
+        """Ignore scans."""
+
+    def written(self, writes: list[WriteGroup]) -> None:
+        """Ignore writes."""
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """Ignore tunables: setting one as an operator is an operation."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.faults import UserError
 from automax_ros.core.problems import Severity
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import Installation
 from automax_ros.rackfile.loader import load_stored

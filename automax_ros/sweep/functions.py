@@ -12,8 +12,8 @@ import math
 from bisect import bisect_left
 from typing import Protocol
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.user_error import UserError
 
 MOST_STEPS = 200_000
 """Most values that a measure of an unknown target keeps (decision): a signal of 16 bits has 65536 at most."""

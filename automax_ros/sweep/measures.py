@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.ticks import exact_ns, seconds_text
 from automax_ros.core.types import DataType
+from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
 from automax_ros.rackfile.model.value_names import common_named

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of, quoted
 from automax_ros.core.types import Value
+from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number
 from automax_ros.rack.rack import Rack
 from automax_ros.sweep.quantities import Quantity, Variable, variable_named

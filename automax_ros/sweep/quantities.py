@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.names import NameFault
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.types import DataType, Value, bare_name
+from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number, value_text, whole_number
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.value_names import Tuning, common_named, setting, tunables_of, tuning

@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.problems import Severity
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.recordings.mcap.errors import BagError

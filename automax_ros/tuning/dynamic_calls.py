@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.declare.declaration import Block
 from automax_ros.blocks.declare.dynamics import Dynamics
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
+from automax_ros.core.user_error import UserError
 from automax_ros.core.values import source_text
 from automax_ros.language.printer import print_expression
 from automax_ros.language.program import BoundCall, Program

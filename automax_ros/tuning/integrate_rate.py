@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from automax_ros.blocks.declare.coefficients import TWO_TO_MINUS_18
-from automax_ros.core.faults import UserError
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, stored_real
 from automax_ros.core.ticks import MAX_TICK_NS, MAX_TICKS, MIN_TICK_NS, NS_PER_S
+from automax_ros.core.user_error import UserError
 from automax_ros.tuning.tuning import IntegratorRange, Verdict, range_of, verdict_of
 
 RATE_FACTOR = (math.pi / 20.0) / math.tan(math.pi / 20.0)

@@ -160,7 +160,12 @@ def test_interrupt_while_imports_last_is_silent(tmp_path):
         "sys.argv[1:] = [wanted]\n"
         "main.sys.exit(main.main(['check', 'none.BLK']))\n"
     )
-    for module in ("argparse", "automax_ros.cli.usage", "automax_ros.cli.tasks.check", "automax_ros.blocks.catalogue"):
+    for module in (
+        "argparse",
+        "automax_ros.core.user_error",
+        "automax_ros.cli.tasks.check",
+        "automax_ros.blocks.catalogue",
+    ):
         with started(module, code=code) as process:
             out, err = process.communicate(timeout=240)
         assert (process.returncode, out, err) == (INTERRUPTED, "", ""), module

@@ -2,8 +2,7 @@
 
 import pytest
 
-from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import UserError
+from automax_ros.core.user_error import UsageError, UserError
 from automax_ros.recordings.mcap.errors import BagError
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.faults import UserError
+from automax_ros.core.user_error import UserError
 from automax_ros.rackfile.loader import load, load_stored
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.plants import PlantConfig

@@ -3,7 +3,7 @@
 import pytest
 
 from automax_ros.rack.base.observers import Operation
-from automax_ros.scenario.operation_log import OperationLog
+from automax_ros.scenario.report import OperationLog
 
 
 @pytest.mark.parametrize(

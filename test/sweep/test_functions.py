@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.user_error import UserError
 from automax_ros.sweep import functions
 from automax_ros.sweep.functions import Accumulator
 

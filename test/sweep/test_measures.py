@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.user_error import UserError
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.sweep.measures import FUNCTIONS, MOST_MEASURES, Measure, Subject, read_measures
 from sweep.helpers import rack_in

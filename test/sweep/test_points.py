@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.numbers import stored_real
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.sweep import points

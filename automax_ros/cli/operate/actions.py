@@ -23,9 +23,9 @@ from automax_ros.cli.operate.text import (
 )
 from automax_ros.cli.operate.watch import NAMES_HELP, add_watch_arguments, values_of
 from automax_ros.cli.options.values import seconds_above_0, whole_number
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import quoted, table
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.reading.files import FileFault, read_task_source
 
 STATE = "state"

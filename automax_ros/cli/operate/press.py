@@ -10,10 +10,10 @@ from typing import Any
 
 from automax_ros.cli.operate.requests import ServiceCall
 from automax_ros.cli.options.values import seconds_above_0
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, type_of_name
+from automax_ros.core.user_error import UsageError
 
 DEFAULT_FOR_S = "0.2"
 _LOOK_S = 0.01

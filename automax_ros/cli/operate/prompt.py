@@ -11,7 +11,7 @@ from automax_ros.cli.operate.actions import ACTIONS, add_actions
 from automax_ros.cli.operate.requests import ServiceCall
 from automax_ros.cli.operate.session import Session, connected
 from automax_ros.cli.output.prompt import Interrupt, edit_lines, typed_lines
-from automax_ros.core.faults import UserError
+from automax_ros.core.user_error import UserError
 
 _QUIT = ("quit", "exit")
 _HELP = "help"

@@ -17,8 +17,8 @@ from automax_ros.cli.operate.text import ALREADY
 from automax_ros.cli.operate.watch import values_of, watch
 from automax_ros.cli.options.rack_name import space_of
 from automax_ros.cli.options.ros import prepare_ros, ros_arguments
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import printable
+from automax_ros.core.user_error import UsageError
 
 if TYPE_CHECKING:
     from automax_ros.ros.clients.rack_client import RackClient

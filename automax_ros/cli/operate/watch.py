@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from automax_ros.cli.options.values import seconds_above_0
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.user_error import UserError
 
 DEFAULT_EVERY_S = "0.5"
 NAMES_HELP = "REF%%, TABLE%%(3), SPEED.ERROR%%; patterns in quotes: 'F_*', 'SPEED.*'"

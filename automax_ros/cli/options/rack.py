@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from automax_ros.cli.output.screen import print_diagnostics, tell_warnings
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of
 from automax_ros.core.types import Value, bare_name
+from automax_ros.core.user_error import UsageError, UserError
 from automax_ros.language.program import Program
 from automax_ros.language.tree.task_kind import is_task_file
 from automax_ros.rack.rack import Rack

@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import quoted
+from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.model.ros_names import namespace
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 

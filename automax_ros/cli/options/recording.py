@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 
 from automax_ros.cli.options.values import option_number, seconds
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.recordings.write.data_file import COMPRESSIONS, StorageOptions
 from automax_ros.recordings.write.recorder import RecordingOptions

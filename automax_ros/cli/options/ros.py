@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from automax_ros.cli.usage import UsageError
+from automax_ros.core.user_error import UsageError
 
 if TYPE_CHECKING:
     from automax_ros.ros.setup.arguments import RosArguments

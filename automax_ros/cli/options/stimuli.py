@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.cli.output.screen import print_diagnostics
-from automax_ros.cli.usage import UsageError
+from automax_ros.core.user_error import UsageError
 from automax_ros.rack.rack import Rack
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import StimuliFile, read_for_rack

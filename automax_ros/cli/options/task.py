@@ -10,13 +10,12 @@ from pathlib import Path
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
-from automax_ros.core.faults import UserError
 from automax_ros.core.names import setting
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
 from automax_ros.core.types import Value
+from automax_ros.core.user_error import UsageError, UserError
 from automax_ros.core.values import value_text
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import Program

@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from automax_ros.cli.usage import UsageError
 from automax_ros.core import values
 from automax_ros.core.ticks import seconds_ns
+from automax_ros.core.user_error import UsageError
 
 if TYPE_CHECKING:
     from automax_ros.recordings.tables.series import Window

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Iterable
 
 from automax_ros.cli.options.values import whole_number
-from automax_ros.cli.usage import UsageError
 from automax_ros.compile.native.run.compiler_process import LIMIT_S
 from automax_ros.compile.native.run.forms import NativeForms, NativeMode, NativeOutcome
+from automax_ros.core.user_error import UsageError
 from automax_ros.parallel.job import Workers
 
 _AUTO = "auto"

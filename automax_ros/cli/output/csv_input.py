@@ -13,9 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TypeVar
 
-from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import printable
+from automax_ros.core.user_error import UsageError, UserError
 
 MAX_LINE = 1_000_000
 """Longest line of a CSV table, in bytes (decision: a bound on memory for untrusted files)."""

@@ -19,7 +19,7 @@ from typing import Protocol
 
 from automax_ros.cli.options.values import number
 from automax_ros.cli.output.files import opened_for_writing
-from automax_ros.cli.usage import UsageError
+from automax_ros.core.user_error import UsageError
 from automax_ros.drive.base.errors import LARGEST, DriveError, require
 from automax_ros.drive.base.motor import Motor, MotorData
 from automax_ros.drive.circuit.bridge import Bridge

@@ -17,9 +17,9 @@ from typing import Any
 
 from automax_ros.cli.options.rack import add_outside_argument, add_set_argument, config_of, settings_of
 from automax_ros.cli.output.screen import print_diagnostics
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import printable
+from automax_ros.core.user_error import UsageError
 from automax_ros.drive.assess.assessment import assess
 from automax_ros.drive.assess.drive_case import DriveCase, DriveFindings, Finding, Verdict
 from automax_ros.language.program import Program

@@ -14,9 +14,9 @@ from pathlib import Path
 
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.cli.racks.new import require_free, write_rack_file
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import SourceText, has_errors
 from automax_ros.core.text import count_of, quoted
+from automax_ros.core.user_error import UsageError
 from automax_ros.language.tree.task_kind import TASK_SUFFIXES
 from automax_ros.rackfile.loader import load_stored
 from automax_ros.rackfile.model.config import MAX_SLOT

@@ -14,9 +14,9 @@ from pathlib import Path
 from automax_ros.cli.options.rack import DEFAULT_RACK_FILE
 from automax_ros.cli.options.task import is_rack_file, tick_option
 from automax_ros.cli.output.screen import print_diagnostics
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import count_of, quoted
+from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.checks.tasks import findings_by_task, with_findings
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.processor import MAX_PROCESSORS

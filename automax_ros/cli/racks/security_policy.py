@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from automax_ros.cli.options.rack import add_outside_argument, config_of, print_refused
 from automax_ros.cli.options.ros import add_ros_arguments, prepare_ros, ros_arguments
-from automax_ros.cli.usage import UsageError
+from automax_ros.core.user_error import UsageError
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.processes import processes_of

@@ -17,8 +17,8 @@ from automax_ros.cli.options.stimuli import StimuliRefused, stimulation
 from automax_ros.cli.output.prompt import Interrupt, edit_lines, typed_lines
 from automax_ros.cli.racks.step_commands import completions, execute
 from automax_ros.cli.racks.step_session import Session, place_text
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import printable
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import Timing

@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import near_or_listed, printable, quoted, table
 from automax_ros.core.ticks import seconds_ns, seconds_text
 from automax_ros.core.types import Value
+from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number, source_text, value_of, whole_number
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.value_names import setting

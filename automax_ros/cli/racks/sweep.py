@@ -24,10 +24,9 @@ from automax_ros.cli.output.screen import ProgressBar
 from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
 from automax_ros.cli.racks.sweep_output import Output, Wanted, best_of, prepared, print_best
 from automax_ros.cli.run.plan import warn
-from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.user_error import UsageError, UserError
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.parallel.job import Workers
 from automax_ros.rack.rack import Rack

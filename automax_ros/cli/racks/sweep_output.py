@@ -15,10 +15,9 @@ from pathlib import Path
 from automax_ros import __version__
 from automax_ros.cli.output.files import require_folder, write_report, write_text
 from automax_ros.cli.racks.sweep_picture import draw
-from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of, quoted, table
 from automax_ros.core.ticks import NS_PER_S, seconds_text
+from automax_ros.core.user_error import UsageError, UserError
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.sweep.measures import Measure, read_measures
 from automax_ros.sweep.run import Plan

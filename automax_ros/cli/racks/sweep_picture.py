@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.cli.output.figure import DPI, save
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import printable
 from automax_ros.core.types import Value
+from automax_ros.core.user_error import UsageError
 from automax_ros.sweep.run import Plan
 from automax_ros.sweep.sweeping import Row
 

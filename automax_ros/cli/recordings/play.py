@@ -18,9 +18,9 @@ from automax_ros.cli.options.ros import add_ros_arguments, prepare_ros, ros_argu
 from automax_ros.cli.options.values import add_window_arguments, option_number, window_of
 from automax_ros.cli.output.screen import ProgressBar, StatusLine
 from automax_ros.cli.output.signals import StopRequest, stop_signals
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import count_of, did_you_mean, printable, quoted
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.user_error import UsageError
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.playback import NOT_CHOSEN, PlayableRecording, Renaming, choose, survey
 

@@ -13,8 +13,8 @@ from automax_ros.cli.output.figure import Layout, figure_of, save
 from automax_ros.cli.output.files import require_picture_file
 from automax_ros.cli.output.screen import share_shown
 from automax_ros.cli.output.signals import ended_by_signals
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.ticks import seconds_text
+from automax_ros.core.user_error import UsageError
 from automax_ros.recordings.tables.export import require_another_file
 from automax_ros.recordings.tables.traces import traces
 

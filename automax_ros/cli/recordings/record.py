@@ -24,10 +24,10 @@ from automax_ros.cli.output.screen import StatusLine
 from automax_ros.cli.output.signals import StopRequest, stop_signals
 from automax_ros.cli.run.saving import DiskSync
 from automax_ros.cli.run.status import recorded_size
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.text import count_of, did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.user_error import UsageError
 from automax_ros.messages.cdr.cdr import CdrError
 from automax_ros.messages.types.messages import VariableTable
 from automax_ros.messages.types.rack_files import RACK_FILE, RackFile, RackFilesError, source_name

@@ -17,8 +17,8 @@ from automax_ros.cli.options.work import add_native_arguments, add_where_argumen
 from automax_ros.cli.output.files import require_different_files, require_picture_file
 from automax_ros.cli.output.screen import print_diagnostics, share_shown, tell_warnings
 from automax_ros.cli.output.signals import ended_by_signals
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.user_error import UsageError
 from automax_ros.parallel.job import ClusterFault, Workers
 from automax_ros.rackfile.reading.files import FileFault, read_task_source
 from automax_ros.recordings.mcap.errors import BagError

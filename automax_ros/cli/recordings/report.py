@@ -19,7 +19,7 @@ from automax_ros.cli.output.files import require_different_files, require_writab
 from automax_ros.cli.output.screen import print_diagnostics, share_shown
 from automax_ros.cli.output.signals import ended_by_signals
 from automax_ros.cli.recordings.report_page import page, rack_page
-from automax_ros.cli.usage import UsageError
+from automax_ros.core.user_error import UsageError
 from automax_ros.recordings.tables.export import require_another_file
 from automax_ros.recordings.tables.traces import MAX_LINES, Traces
 from automax_ros.replay.drive_report.drive_report import DriveReport, drive_report

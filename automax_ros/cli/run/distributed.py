@@ -15,9 +15,9 @@ from automax_ros.cli.run.plan import RunPlan, warn
 from automax_ros.cli.run.process_messages import ProcessMessage, TextLine, merged_report
 from automax_ros.cli.run.status import Progress, Summary, TerminalOutput, merged_progress, merged_summary
 from automax_ros.cli.run.supervisor import ProcessSpec, Supervisor
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.user_error import UsageError
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.processes import RackProcess, processes_of
 from automax_ros.ros.setup.discovery import range_text

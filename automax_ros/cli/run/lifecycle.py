@@ -15,7 +15,7 @@ from automax_ros.cli.output.signals import StopRequest, WorkInterrupted
 from automax_ros.cli.run.live import LiveSession
 from automax_ros.cli.run.plan import RunPlan
 from automax_ros.core.diagnostics import render
-from automax_ros.core.faults import UserError
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.recordings.mcap.errors import BagError

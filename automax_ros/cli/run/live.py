@@ -25,7 +25,7 @@ from automax_ros.ros.nodes.rack import RackNode
 from automax_ros.ros.rack_nodes import LiveRack
 from automax_ros.ros.setup.discovery import range_text
 from automax_ros.ros.setup.process import RosProcess
-from automax_ros.scenario.operation_log import OperationLog
+from automax_ros.scenario.report import OperationLog
 
 SWITCH_S = 0.0005
 """Interpreter switch interval, s: how long a thread that saves or sends may delay scans (Python's default is 5 ms)."""

@@ -22,8 +22,8 @@ from automax_ros.cli.output.signals import StopRequest, stop_signals
 from automax_ros.cli.run.child_process import end_with_watcher
 from automax_ros.cli.run.plan import ProcessPlan, RunPlan
 from automax_ros.cli.run.run import check_files, folder, watched_commons
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import quoted
+from automax_ros.core.user_error import UsageError
 from automax_ros.rack.operator.retention import RetentionFault
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import RackConfig

@@ -31,9 +31,8 @@ from automax_ros.cli.output.files import held_for_writing, require_different_fil
 from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
 from automax_ros.cli.run.plan import RunPlan
 from automax_ros.cli.run.simulated import run_simulated
-from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import UserError
 from automax_ros.core.types import bare_name
+from automax_ros.core.user_error import UsageError, UserError
 from automax_ros.rack.operator.retention import RetentionFault
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import CommonElement, RackConfig

@@ -8,8 +8,8 @@ import sys
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Block
 from automax_ros.blocks.describe import description, summary, template, templates
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.core.user_error import UsageError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -24,10 +24,10 @@ from automax_ros.cli.options.task import (
     target_of,
 )
 from automax_ros.cli.output.screen import print_diagnostics
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, as_json, has_errors, in_order
 from automax_ros.core.problems import Severity
 from automax_ros.core.text import count_of, printable
+from automax_ros.core.user_error import UsageError
 
 _OF_OLD_PLANTS = ("AMX0003", "AMX0006", "AMX0021", "AMX2016", "AMX4008")
 """The problems that `automax convert` corrects."""

@@ -21,10 +21,10 @@ from typing import TextIO
 from automax_ros.cli.output.csv_input import CsvFault, CsvTable
 from automax_ros.cli.output.files import opened_for_writing, require_different_files
 from automax_ros.cli.output.screen import ProgressBar
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.text import count_of, did_you_mean, printable, quoted, table
 from automax_ros.core.types import DataType
+from automax_ros.core.user_error import UsageError
 from automax_ros.core.values import value_of, wanted, whole_number
 from automax_ros.logix.pmul import GAIN_ONE
 from automax_ros.logix.pulse_comparison import DEFAULT_MULTIPLIER, Pair, PulseComparison, PulseParameters

@@ -11,10 +11,10 @@ import sys
 from importlib import resources
 
 from automax_ros.cli.output.screen import painted, wants_colour
-from automax_ros.cli.usage import UsageError
 from automax_ros.cli.visible import write_control
 from automax_ros.core.problems import PROBLEMS, Problem
 from automax_ros.core.text import quoted
+from automax_ros.core.user_error import UsageError
 
 _CODE = re.compile(r"(?:AMX)?([0-9]{4})")
 _NEAR = 3

@@ -17,8 +17,8 @@ from automax_ros.cli.options.task import add_call_arguments, add_target_argument
 from automax_ros.cli.options.values import number, whole_number
 from automax_ros.cli.output.files import opened_for_writing, require_different_files
 from automax_ros.cli.tasks.tune_info import checked_program
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.numbers import INT16_MAX
+from automax_ros.core.user_error import UsageError
 from automax_ros.language.program import Program
 from automax_ros.tuning.dynamic_calls import DynamicCall, require_running, tuning_of
 from automax_ros.tuning.response import BlockResponse, Range, measured_response

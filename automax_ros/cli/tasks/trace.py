@@ -27,12 +27,12 @@ from automax_ros.cli.options.work import add_native_arguments, native_forms, tel
 from automax_ros.cli.output.files import opened_for_writing, require_different_files
 from automax_ros.cli.output.screen import ProgressBar, print_diagnostics
 from automax_ros.cli.tasks.trace_rows import InputTable, StimulatedScans
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.names import NameFault
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
+from automax_ros.core.user_error import UsageError
 from automax_ros.core.values import value_text
 from automax_ros.runtime.scan.error_log import LogEntry
 from automax_ros.runtime.tasks.standalone_task import LoneVariable, StandaloneTask

@@ -29,9 +29,9 @@ from automax_ros.cli.options.task import (
 )
 from automax_ros.cli.options.values import number, whole_number
 from automax_ros.cli.output.screen import print_diagnostics
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.ticks import MAX_TICKS, NS_PER_MS, NS_PER_S, UDC_MAX_TICKS
+from automax_ros.core.user_error import UsageError
 from automax_ros.language.program import Program
 from automax_ros.tuning.dynamic_calls import DynamicCall, Source, tuning_of
 from automax_ros.tuning.frequency import decibels

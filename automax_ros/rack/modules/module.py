@@ -9,8 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 from automax_ros.drive.plant.plant import DrivePlant
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rack.tasks.triggers import MakeTrigger
-from automax_ros.rackfile.model.module import ModuleConfig
-from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.model.module import ModuleConfig, TaskConfig
 from automax_ros.runtime.memory.common_clock import CommonClock
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.process_inputs import ProcessInputs

@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.compile.base.layout import Role, StateField
-from automax_ros.core.faults import UserError
 from automax_ros.core.names import NameFault, element_name
 from automax_ros.core.safe_file import replace_file
 from automax_ros.core.types import Value
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.base.local_names import local_named
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig

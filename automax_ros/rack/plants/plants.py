@@ -8,8 +8,7 @@ from automax_ros.drive.base.errors import DriveError
 from automax_ros.drive.base.state import SavedState
 from automax_ros.drive.plant.coupling import CoupledPlants
 from automax_ros.drive.plant.plant import DrivePlant
-from automax_ros.rackfile.model.plant_data import build_plants, couple_plants
-from automax_ros.rackfile.model.plants import PlantConfig
+from automax_ros.rackfile.model.plants import PlantConfig, build_plants, couple_plants
 
 
 class RackPlants(Mapping[str, DrivePlant]):

@@ -11,7 +11,7 @@ from automax_ros.rack.tasks.installation import Installation
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rack.tasks.triggers import DriveTrigger, MakeTrigger, Trigger, usual_trigger
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.model.module import TaskConfig
 from automax_ros.rackfile.model.writers import writers_of
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.registers import Backplane

@@ -11,8 +11,7 @@ from automax_ros.core.diagnostics import Diagnostic
 from automax_ros.language.program import BoundCall, Program, Symbol
 from automax_ros.language.tree.tree import Scope
 from automax_ros.rackfile.model.config import Point, RackConfig
-from automax_ros.rackfile.model.module import ModuleConfig
-from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.model.module import ModuleConfig, TaskConfig
 from automax_ros.rackfile.modules.drive import DRIVE_CONTROLLER, DriveConfig
 from automax_ros.rackfile.modules.io import DRIVE_MODEL
 

@@ -27,8 +27,7 @@ from automax_ros.rackfile.checks.register_writes import numbered_writes
 from automax_ros.rackfile.model.config import Point, RackConfig, Timing
 from automax_ros.rackfile.model.driven import Driving
 from automax_ros.rackfile.model.module import ModuleConfig
-from automax_ros.rackfile.model.plant_data import plant_data
-from automax_ros.rackfile.model.plants import PlantConfig
+from automax_ros.rackfile.model.plants import PlantConfig, plant_data
 from automax_ros.rackfile.modules.drive import DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
 from automax_ros.rackfile.modules.processor import PROCESSOR
 

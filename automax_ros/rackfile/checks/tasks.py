@@ -17,8 +17,7 @@ from automax_ros.rackfile.checks.drive_rules import drive_findings
 from automax_ros.rackfile.checks.interrupts import interrupt_findings
 from automax_ros.rackfile.checks.udc_rules import udc_findings
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.model.module import ModuleConfig
-from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.model.module import ModuleConfig, TaskConfig
 from automax_ros.rackfile.reading.files import FileFault, read_task_source
 from automax_ros.rackfile.sections.feeds import feed_findings
 

@@ -14,9 +14,8 @@ from pathlib import Path
 from automax_ros.core.kinds import Direction
 from automax_ros.core.names import Element
 from automax_ros.core.types import DataType, Value
-from automax_ros.rackfile.model.module import ModuleConfig, Registers
+from automax_ros.rackfile.model.module import ModuleConfig, Registers, TaskConfig
 from automax_ros.rackfile.model.plants import FeedConfig, JointCommand, PlantConfig
-from automax_ros.rackfile.model.task import TaskConfig
 from automax_ros.rackfile.reading.executive import NEWEST
 from automax_ros.rackfile.reading.scale import Scale
 

@@ -12,8 +12,7 @@ from types import MappingProxyType
 
 from automax_ros.compile.base.cost import Model
 from automax_ros.core.json_schema import Keys
-from automax_ros.rackfile.model.module import NO_REGISTERS, Registers
-from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.model.module import NO_REGISTERS, Registers, TaskConfig
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 
 COMMON_REGISTERS = {"57C413": 65536, "57C423": 131072}

@@ -37,8 +37,7 @@ from typing import Protocol, runtime_checkable
 
 from automax_ros.compile.base.cost import Model
 from automax_ros.core.json_schema import Keys
-from automax_ros.rackfile.model.module import Interrupt, Registers
-from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.model.module import Interrupt, Registers, TaskConfig
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 
 

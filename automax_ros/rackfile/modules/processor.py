@@ -17,8 +17,7 @@ from automax_ros.compile.base.cost import Model
 from automax_ros.core.json_schema import Keys, steps
 from automax_ros.core.ticks import DEFAULT_TICK_NS, MAX_TICK_NS, MIN_TICK_NS, NS_PER_MS, TICK_STEP_NS, tick_ns
 from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.rackfile.model.module import NO_REGISTERS, Registers
-from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.model.module import NO_REGISTERS, Registers, TaskConfig
 from automax_ros.rackfile.modules.common_memory import COMMON_MEMORY
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 from automax_ros.rackfile.reading.executive import OLDEST, tick_fault, version_text

@@ -26,9 +26,8 @@ from automax_ros.drive.pmi.registers import DRIVE_B, WRITTEN
 from automax_ros.language.program import Program, Symbol
 from automax_ros.language.tree.tree import Scope
 from automax_ros.language.tree.walk import arguments_of, expressions_of, parts, statements_in_order
-from automax_ros.rackfile.model.module import Interrupt, Registers
+from automax_ros.rackfile.model.module import Interrupt, Registers, TaskConfig
 from automax_ros.rackfile.model.plants import PlantConfig, plant_name
-from automax_ros.rackfile.model.task import TaskConfig
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, text_value
 from automax_ros.rackfile.sections.tasks import TaskPlace, tasks_schema

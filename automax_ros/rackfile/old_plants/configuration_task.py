@@ -19,7 +19,7 @@ from automax_ros.language.text.lines import LineReader, LogicalLine
 from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
 from automax_ros.language.text.tokens import Kind, Token
 from automax_ros.rackfile.model.config import MAX_SLOT, Point
-from automax_ros.rackfile.model.task import MAX_PRIORITY, MIN_PRIORITY
+from automax_ros.rackfile.model.module import MAX_PRIORITY, MIN_PRIORITY
 from automax_ros.rackfile.reading.names import (
     DeclarationFault,
     VariableName,

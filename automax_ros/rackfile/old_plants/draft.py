@@ -21,10 +21,10 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.compile.base.cost import Model
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_MS, UDC_TICK_NS
 from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataType, declaration_text
+from automax_ros.core.user_error import UserError
 from automax_ros.language.checks.checker import CheckResult
 from automax_ros.language.parse.parser import parse
 from automax_ros.language.program import CommonSpec, Program, places_that_write
@@ -33,7 +33,7 @@ from automax_ros.language.tree.tree import Call, Declaration, Declared, Module, 
 from automax_ros.language.tree.walk import statements_in_order
 from automax_ros.rackfile.checks.tasks import check_source
 from automax_ros.rackfile.model.config import DEFAULT_OUT_LIMIT, MAX_SLOT, CommonVariable
-from automax_ros.rackfile.model.task import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY
+from automax_ros.rackfile.model.module import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY
 from automax_ros.rackfile.modules.common_memory import COMMON_REGISTERS
 from automax_ros.rackfile.modules.processor import MAX_PROCESSORS
 from automax_ros.rackfile.modules.udc import DRIVES, EVERY_SCAN, UDC

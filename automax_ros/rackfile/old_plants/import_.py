@@ -8,7 +8,7 @@ from pathlib import Path
 
 from automax_ros.core.diagnostics import Diagnostic, Span
 from automax_ros.core.types import declaration_text
-from automax_ros.rackfile.model.task import MAX_TASKS
+from automax_ros.rackfile.model.module import MAX_TASKS
 from automax_ros.rackfile.modules.io import HasTable
 from automax_ros.rackfile.modules.registry import KINDS
 from automax_ros.rackfile.old_plants.configuration_task import Configuration, DefinedCommon, DefinedTask

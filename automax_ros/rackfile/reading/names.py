@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.types import (
     DEFAULT_STRING_LENGTH,
     MAX_ARRAY_ELEMENTS,
@@ -20,6 +19,7 @@ from automax_ros.core.types import (
     DataType,
     type_of_name,
 )
+from automax_ros.core.user_error import UserError
 from automax_ros.language.text.tokens import RESERVED_WORDS
 from automax_ros.language.tree.functions import FUNCTIONS, REFUSED_FUNCTIONS
 

@@ -10,8 +10,7 @@ from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.yaml_text import Node
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.coupling import LEAST_RATIO, MOST_RATIO, CouplingData
-from automax_ros.rackfile.model.plant_data import build_plants, couple_plants
-from automax_ros.rackfile.model.plants import CoupleConfig, PlantConfig, plant_name
+from automax_ros.rackfile.model.plants import CoupleConfig, PlantConfig, build_plants, couple_plants, plant_name
 from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value, text_value
 
 CODE = "AMX6478"

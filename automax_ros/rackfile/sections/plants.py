@@ -14,8 +14,15 @@ from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.base.nameplate import NamePlate
-from automax_ros.rackfile.model.plant_data import plant_data
-from automax_ros.rackfile.model.plants import MOTORS, PLANT_NAME, LoadConfig, PlantConfig, SupplyConfig, plant_name
+from automax_ros.rackfile.model.plants import (
+    MOTORS,
+    PLANT_NAME,
+    LoadConfig,
+    PlantConfig,
+    SupplyConfig,
+    plant_data,
+    plant_name,
+)
 from automax_ros.rackfile.reading.values import (
     ProblemList,
     Section,

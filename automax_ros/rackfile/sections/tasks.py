@@ -11,7 +11,7 @@ from automax_ros.core.json_schema import Keys, Schema, entries, flag, line, may_
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.language.tree.task_kind import LADDER_SUFFIX, TASK_SUFFIXES, NotATask, is_task_file, kind_of_file
-from automax_ros.rackfile.model.task import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
+from automax_ros.rackfile.model.module import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
 from automax_ros.rackfile.reading.files import FileFault, read_bytes, stays_next_to
 from automax_ros.rackfile.reading.names import TASK_NAME, DeclarationFault, check_task_name
 from automax_ros.rackfile.reading.values import (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import printable
+from automax_ros.core.user_error import UserError
 
 
 class BagError(UserError):

@@ -22,8 +22,7 @@ from automax_ros.messages.types.messages import VariableTable
 from automax_ros.rackfile.checks.tasks import check_source, commons_of
 from automax_ros.rackfile.loader import load_stored
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
-from automax_ros.rackfile.model.module import ModuleConfig
-from automax_ros.rackfile.model.task import MAX_TASKS
+from automax_ros.rackfile.model.module import MAX_TASKS, ModuleConfig
 from automax_ros.rackfile.modules.processor import MAX_PROCESSORS
 from automax_ros.rackfile.modules.udc import DRIVES, MAX_UDCS
 from automax_ros.rackfile.reading.files import MAX_BYTES

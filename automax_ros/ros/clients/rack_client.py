@@ -11,8 +11,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.user_error import UserError
 from automax_ros.ros.clients import recorded_run as participants
 from automax_ros.ros.clients.recorded_run import racks_of
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments

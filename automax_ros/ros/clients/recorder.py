@@ -25,8 +25,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.user_error import UserError
 from automax_ros.messages.cdr.cdr import CdrError, decode
 from automax_ros.messages.cdr.message_headers import table_of
 from automax_ros.messages.types.messages import Presence, VariableTable

@@ -23,9 +23,9 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.qos import LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import DataType
+from automax_ros.core.user_error import UserError
 from automax_ros.messages.bus.bus import (
     AHEAD_NS,
     BUS,

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from automax_ros.core.faults import UserError
+from automax_ros.core.user_error import UserError
 from automax_ros.ros.security.policy import Validity, governance_text, permissions_text
 from automax_ros.ros.security.profiles import Enclave
 

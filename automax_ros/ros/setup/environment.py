@@ -25,7 +25,7 @@ import sysconfig
 import tempfile
 from pathlib import Path
 
-from automax_ros.core.faults import UserError
+from automax_ros.core.user_error import UserError
 from automax_ros.messages.types.definitions import message_types
 from automax_ros.ros.setup.discovery import announce_soon, choose_range
 

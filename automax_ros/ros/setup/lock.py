@@ -9,8 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
+from automax_ros.core.user_error import UserError
 from automax_ros.ros.setup.environment import RosUnavailable
 
 MAX_DOMAIN = 232

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
+from automax_ros.core.user_error import UserError
 from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence, read_yaml
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 

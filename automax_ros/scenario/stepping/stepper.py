@@ -14,9 +14,9 @@ import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.types import Value
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.base.stop_cause import StopCause
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask

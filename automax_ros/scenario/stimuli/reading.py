@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import exact_ns
 from automax_ros.core.types import DataType, Value
+from automax_ros.core.user_error import UserError
 from automax_ros.core.values import value_of, value_text, wanted
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rackfile.reading.values import (

@@ -9,8 +9,7 @@ from system.support import RACKS
 
 from automax_ros.cli.operate.actions import ACTIONS
 from automax_ros.cli.options.rack_name import space_of
-from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import UserError
+from automax_ros.core.user_error import UsageError, UserError
 
 
 def asked(action: str, *words: str) -> list[dict[str, object]]:

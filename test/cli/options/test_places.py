@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from automax_ros.cli.options.work import add_where_arguments, where_of
-from automax_ros.cli.usage import UsageError
+from automax_ros.core.user_error import UsageError
 from automax_ros.parallel.job import Workers
 
 RACK = Path(__file__).parents[3] / "config" / "section_drive"

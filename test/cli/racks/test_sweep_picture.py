@@ -9,7 +9,7 @@ import pytest
 from sweep.helpers import plan_of, rack_in
 
 from automax_ros.cli.racks import sweep_picture
-from automax_ros.cli.usage import UsageError
+from automax_ros.core.user_error import UsageError
 from automax_ros.sweep.points import grid, read_varied, sample
 from automax_ros.sweep.run import Outcome, Plan
 from automax_ros.sweep.sweeping import Row

@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rack.helpers import HEAD, good
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.kinds import Direction
 from automax_ros.core.names import NameFault
 from automax_ros.core.types import DataType
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
 from automax_ros.rackfile.model.value_names import DEFAULT_WATCHED, setting, watched

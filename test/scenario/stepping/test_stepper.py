@@ -2,8 +2,8 @@
 
 import pytest
 
-from automax_ros.core.faults import UserError
 from automax_ros.core.names import NameFault
+from automax_ros.core.user_error import UserError
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status

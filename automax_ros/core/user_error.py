@@ -23,3 +23,7 @@ class UserError(Exception):
         head = f"{printable(self.place)}: " if self.place else ""
         head += f"error[{self.code}]: " if self.code and self.place else ""
         return f"{head}{self.message}\n  hint: {self.hint}" if self.hint else f"{head}{self.message}"
+
+
+class UsageError(UserError):
+    """The command cannot do what was asked: wrong arguments, or an unreadable file; exit code 2."""
