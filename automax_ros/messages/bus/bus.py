@@ -3,9 +3,9 @@
 Both ends have the same rack file, so variables are identified by numbers. Times in messages are instants of rack time:
 all processes of a run share its start.
 
-Any program that can publish on the bus can send any numbers. Impossible values are refused on reception, only here:
-seats and slots that the rack does not have, and times outside of a run. A time that no later one can exceed, for
-example, would win against all later writes for ever (decision: limits as below).
+Any program that can publish on the bus can send any numbers. Seats and slots that the rack does not have, and times
+outside of a run, are refused on reception, only here: a time that no later one can exceed, for example, would override
+all later writes for ever (decision: limits as below).
 """
 
 from __future__ import annotations

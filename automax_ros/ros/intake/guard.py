@@ -75,7 +75,7 @@ class RequestGuard:
     def refusal(self, name: str, kind: Any, error: Exception) -> Any:
         """Report a request to the service ``name`` that failed or was not read, and return its response.
 
-        It has one result, however many parameters were to be set (decision: who asks looks at the first).
+        The response has one result, however many parameters were to be set (decision: who asks looks at the first).
         """
         self.report(f"a request to {name} was refused", error)
         reason = str(error)[:MOST_TOLD]

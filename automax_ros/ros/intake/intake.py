@@ -2,8 +2,8 @@
 
 They wait in DDS, as many of each topic or service as its quality of service keeps; older ones are dropped there. The
 thread is woken by counters that DDS's own threads increment (no Python runs for a message that only waits), takes at
-most ``MOST_A_ROUND`` in turn, gives way to scans (``RackLock``), and rests a millisecond. Messages are taken on this
-thread, not by callbacks of an executor or by polling between scans (decision: EventsExecutor queues an event for each
+most ``MOST_A_ROUND`` in turn, gives way to scans (``RackLock``), and rests a millisecond. A separate thread takes them,
+not callbacks of an executor or polling between scans (decision: EventsExecutor queues an event for each
 message without bound; a message of 10 MB holds up the thread that takes it for 10 to 70 ms; a look at a topic costs
 1.5 us, half a core with 300 topics each millisecond). All measured on two cores of a virtual machine (docs/ros.md).
 """

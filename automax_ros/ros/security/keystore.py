@@ -2,8 +2,8 @@
 
 It has the form of `ros2 security create_keystore`: ``public``, ``private`` and ``enclaves``. The one authority, whose
 key stays in ``private``, signs identities and permissions. An existing authority is kept, and so are keys of enclaves:
-only permissions are written again. So the racks of a plant can be added to one keystore, one after the other. openssl
-does the work; keys are of the curve prime256v1 and last ``DAYS`` (decision).
+only permissions are written again. So the racks of a plant can be added to one keystore, one after the other. It calls
+openssl; keys are of the curve prime256v1 and last ``DAYS`` (decision).
 """
 
 from __future__ import annotations
