@@ -69,7 +69,7 @@ class RackClock:
 
     @property
     def is_there(self) -> bool:
-        """Whether the rack can start: if it follows ``/clock``, once a message was received."""
+        """Whether the rack can start: if it follows ``/clock``, after its first message."""
         return self._follower is None or self._follower.has_clock
 
     def join(self, site: RackContext, node: ModuleNode) -> None:

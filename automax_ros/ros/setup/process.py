@@ -105,7 +105,7 @@ def dispatches(executor: Any, context: Context) -> bool:
 
 
 def take_out(executor: Any, nodes: Iterable[Node], *, spun: bool = True) -> None:
-    """Remove nodes from an executor, and wait until a thread that spins it does not use them: they may be destroyed.
+    """Remove nodes from an executor, and wait until a thread that spins it no longer uses them: they may be destroyed.
 
     If no thread spins it there is no wait, but finding that out takes half a second unless ``spun`` is False.
 
