@@ -1,1 +1,1 @@
-"""Instructions of the Logix controllers that take the place of control blocks."""
+"""Instructions of the Logix controllers that replace control blocks."""

@@ -11,7 +11,7 @@ _SINGLE = struct.Struct("<f")
 
 
 def require_dint(member: str, value: object) -> None:
-    """Refuse what a DINT member cannot hold: it is a whole number in 32 bits, two's complement.
+    """Refuse a value that a DINT member cannot hold: it holds a whole number of 32 bits, two's complement.
 
     Raises:
         ValueError: ``value`` is not an int or lies beyond 32 bits; the message names the member.
@@ -21,7 +21,7 @@ def require_dint(member: str, value: object) -> None:
 
 
 def require_real(member: str, value: object) -> None:
-    """Refuse what is not a number for a REAL member; a number that is too large is Infinity there.
+    """Refuse a value for a REAL member that is not a number; a number that is too large becomes Infinity there.
 
     Raises:
         ValueError: ``value`` is not a number; the message names the member.
@@ -31,7 +31,7 @@ def require_real(member: str, value: object) -> None:
 
 
 def single(value: float) -> float:
-    """Return what a REAL holds of a number: the nearest IEEE 754 single, +-Infinity beyond the largest."""
+    """Return a number as a REAL holds it: the nearest IEEE 754 single, +-Infinity beyond the largest."""
     try:
         held: float = _SINGLE.unpack(_SINGLE.pack(value))[0]
     except (OverflowError, struct.error):  # the latter for an int that is too large for any float

@@ -1,6 +1,6 @@
 """PMUL, the pulse multiplier of the Logix controllers: counts/scan of a feedback module, without losing any.
 
-The source is the Logix Designer page of the instruction. Its own examples decide two misprints there: the roll-over
+The source is the Logix Designer page of the instruction. Its own examples resolve two misprints there: the roll-over
 edge is 2**(WordSize - 1), and "2500 => (25,000/100,000)" means a Multiplier of 25000.
 """
 
@@ -15,7 +15,7 @@ from automax_ros.logix.data_types import require_dint, single
 GAIN_ONE = 100_000
 """The Multiplier whose ratio of In to Out is 1."""
 MULTIPLIER_LIMIT = 1_000_000
-"""Largest magnitude of a Multiplier; what lies beyond is limited to it."""
+"""Largest magnitude of a Multiplier; larger ones are limited to it."""
 MIN_WORD_SIZE, MAX_WORD_SIZE = 2, 32
 EXACT_LIMIT = 2**24
 """Largest magnitude of Out up to which a REAL holds every whole number."""
@@ -41,16 +41,16 @@ class PulseMultiplier:
     Where the page is silent:
 
     - Ans has 64 bits, which it never leaves, and INT_Out is a DINT (decision).
-    - OutOverflow tells that the quotient left 32 bits: Out is then Infinity of its sign, and the remainder is that of
+    - OutOverflow means that the quotient left 32 bits: Out is then Infinity of its sign, and the remainder is that of
       the true quotient (decision).
-    - LostPrecision judges the integer, before it becomes a REAL; an infinite Out has lost precision too (decision).
+    - LostPrecision depends on the integer, before it becomes a REAL; an infinite Out has lost precision too (decision).
     - InstructFault is set with any of the other four bits (decision): they are the errors that its text lists.
     - The difference keeps its low WordSize bits with their sign, as in PULSE_MULT: a change of exactly half a word
       gives -2**(WordSize - 1) in either direction.
     - An invalid WordSize holds Out with its status bits, In(n-1) and the remainder: a later valid WordSize counts from
       there. On a first scan it holds an Out of 0 (the page: Out(n-1) = 0). In absolute mode, which does not use it, no
       WordSize is invalid.
-    - Initialize is stronger than an invalid WordSize. Both parameters are judged while it is set.
+    - Initialize takes precedence over an invalid WordSize. Both parameters are checked while it is set.
     - Without EnableIn registers and Status stay as they are: the next execution sees the whole change since the last.
     - The first scan is the first execution of a new tag or after a prescan. With Initialize set it is like any other.
     - Absolute mode keeps In(n-1) up to date, so that a change of Mode starts from the last In.
@@ -140,7 +140,7 @@ class PulseMultiplier:
         require_dint("Multiplier", self.Multiplier)
 
     def _set_registers(self) -> None:
-        """Give the registers what Initialize, its end, or a first scan demands."""
+        """Set the registers as Initialize, its end, or a first scan requires."""
         if self._first_scan:
             self.Out, self.Status = 0.0, 0
         if self.Initialize:
@@ -163,7 +163,7 @@ class PulseMultiplier:
         return found
 
     def _multiplied(self) -> int:
-        """Return INT_Out of this scan and keep what is left over."""
+        """Return INT_Out of this scan and store the remainder."""
         difference = sign_extended(self.In - self.previous_in, self.WordSize) if self.Mode else self.In
         multiplier = max(-MULTIPLIER_LIMIT, min(self.Multiplier, MULTIPLIER_LIMIT))
         answer = difference * multiplier + self.remainder
@@ -174,7 +174,7 @@ class PulseMultiplier:
 
 
 def _out_of(quotient: int) -> tuple[float, int]:
-    """Return Out and the status bits that speak of it."""
+    """Return Out and the status bits about it."""
     if not INT32_MIN <= quotient <= INT32_MAX:
         return math.copysign(math.inf, quotient), _OUT_OVERFLOW | _LOST_PRECISION
     return single(quotient), 0 if -EXACT_LIMIT <= quotient <= EXACT_LIMIT else _LOST_PRECISION

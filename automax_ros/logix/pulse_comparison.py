@@ -1,7 +1,4 @@
-"""PULSE_MULT and the PMUL that takes its place, run side by side over the same feedback.
-
-The parameters of a PULSE_MULT as those of the PMUL that takes its place.
-"""
+"""Converts the parameters of a PULSE_MULT to those of the PMUL that replaces it, and runs both on the same feedback."""
 
 from __future__ import annotations
 
@@ -21,12 +18,12 @@ MAX_WORD_SIZE = 16
 
 
 class ConversionError(UserError):
-    """A parameter that PULSE_MULT does not take, or one without equivalent in PMUL."""
+    """A parameter that PULSE_MULT does not accept, or one without equivalent in PMUL."""
 
 
 @dataclass(frozen=True)
 class PulseParameters:
-    """Parameters of a PULSE_MULT; ``multiplier`` is None where the CALL does not program it.
+    """Parameters of a PULSE_MULT; ``multiplier`` is None if the CALL does not program it.
 
     Raises:
         ConversionError: a parameter is out of range, or is a WORD_SIZE of 1.
@@ -72,7 +69,7 @@ class PulseParameters:
         return (self.pmul_multiplier * DEFAULT_MULTIPLIER - self.numerator * GAIN_ONE) * 10 / DEFAULT_MULTIPLIER
 
     def pmul(self) -> PulseMultiplier:
-        """Return a new PMUL tag with these parameters; in absolute mode, which has no WordSize, the default's."""
+        """Return a new PMUL tag with these parameters; in absolute mode, which has no WordSize, with the default."""
         tag = PulseMultiplier(Mode=self.relative, Multiplier=self.pmul_multiplier, InitialValue=self.initial_value)
         if self.relative:
             tag.WordSize = self.word_size
@@ -99,15 +96,15 @@ class Pair:
 
 
 class PulseComparison:
-    """Runs both, and remembers where outputs and totals differ.
+    """Runs both, and records where outputs and totals differ.
 
-    ``output`` and ``total`` are those of the last scan, ``scans`` and ``differing`` how many scans were run and on how
-    many of them the outputs differed. The four that follow are None while nothing differs; of several greatest
-    differences the first counts. A total is the sum of all outputs, exact, and runs on through resets (decision).
+    ``output`` and ``total`` are those of the last scan, ``scans`` and ``differing`` the numbers of scans run and of
+    those with different outputs. The four attributes that follow are None while nothing differs; of several greatest
+    differences the first counts. A total is the sum of all outputs, exact, and continues through resets (decision).
     """
 
     def __init__(self, parameters: PulseParameters) -> None:
-        """Start both new, as on the first scan of a task."""
+        """Create both, as before the first scan of a task."""
         self._block = Instance(PULSE_MULT, DEFAULT_TICK_NS, **_literals(parameters))  # the period does not matter to it
         self._tag = parameters.pmul()
         self.scans = 0

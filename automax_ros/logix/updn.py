@@ -1,4 +1,4 @@
-"""UPDN, the up/down accumulator of the Logix controllers: as far as a position is summed up after PMUL."""
+"""UPDN, the up/down accumulator of the Logix controllers, as needed to accumulate a position after PMUL."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class UpDownAccumulator:
     """A tag of type UP_DOWN_ACCUM, with the instruction's internal accumulator.
 
     Set the input members, call ``scan``, read ``Out``. Numbers are REAL: each sum is rounded to an IEEE single, so
-    whole numbers are exact up to 2**24 = 16,777,216 and counts get lost beyond.
+    whole numbers are exact up to 2**24 = 16,777,216 and counts are lost beyond.
 
     Covered: all eight members and the three cases of the algorithm: Initialize gives InitialValue, else Hold keeps the
     accumulator, else it becomes accumulator + InPlus - InMinus. Not covered: the controller's math status flags.
@@ -46,7 +46,7 @@ class UpDownAccumulator:
         self.EnableOut = False
 
     def scan(self) -> None:
-        """Execute the instruction once, if EnableIn is set; without it Out and the accumulator stay.
+        """Execute the instruction once, if EnableIn is set; without it Out and the accumulator do not change.
 
         Raises:
             ValueError: InitialValue, InPlus or InMinus is not a number; nothing was executed.

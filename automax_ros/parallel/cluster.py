@@ -1,11 +1,10 @@
 """Pieces done by the workers of a Dask cluster.
 
-A scheduler executes whatever it is handed by whoever reaches it: keep it in a closed network, or let it speak TLS
-(addresses ``tls://``; certificates come from Dask's own configuration).
+A scheduler executes the code that any client sends: keep it in a closed network, or use TLS (addresses ``tls://``;
+certificates come from Dask's own configuration).
 
-Connects to a Dask scheduler, or says within a bounded time why not.
-
-What a worker of a Dask cluster executes: one piece, if it may.
+``client_of`` connects to a scheduler, or raises within a bounded time. ``attempt`` is executed by a worker: it does one
+piece, if it may.
 """
 
 from __future__ import annotations
@@ -26,11 +25,11 @@ from automax_ros.parallel.job import MOST_TRIES, ClusterFault, Job, JobResult, P
 
 _T = TypeVar("_T")
 CONNECT_S = 10
-"""How long a scheduler may take to answer, s (decision)."""
+"""How long a scheduler may take to respond, s (decision)."""
 _MORE_S = 5
-"""How much longer Dask may take to say that it does not: for a server that is none it would wait for ever."""
+"""How much longer Dask may take to report that, s: with a server that is not a scheduler it would wait for ever."""
 _BEGINNINGS = 3
-"""How often a client is begun (decision): Dask gives its thread 10 s to begin, and fails by a bare AssertionError."""
+"""How often a client is started (decision): Dask gives its thread 10 s to start, and raises a bare AssertionError."""
 _INSTALL = "install it with `pip install 'automax_ros[cluster]'`"
 _ADDRESS = "give the address that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
 
@@ -39,7 +38,7 @@ def client_of(scheduler: str) -> Any:
     """Return a distributed.Client of a scheduler.
 
     Raises:
-        ClusterFault: Dask is not installed; no scheduler answers; this machine is too busy to ask.
+        ClusterFault: Dask is not installed; no scheduler responds; this machine is too busy to call it.
     """
     try:
         from distributed import Client
@@ -61,10 +60,10 @@ def client_of(scheduler: str) -> Any:
 
 
 def within(seconds: float, ask: Callable[[], _T]) -> _T:
-    """Return what a question to a cluster brings; of Dask's own questions some wait for ever.
+    """Return the result of a call to a cluster; some of Dask's own calls wait for ever.
 
     Raises:
-        TimeoutError: there is no answer within the time.
+        TimeoutError: there is no result within the time.
     """
     answer: futures.Future[_T] = futures.Future()
     threading.Thread(target=_put_answer, args=(ask, answer), daemon=True).start()
@@ -86,7 +85,7 @@ def _begin(kind: Any, scheduler: str, begun: futures.Future[Any]) -> None:
     try:
         client.__init__(scheduler, timeout=CONNECT_S, set_as_default=False)
     except BaseException as error:
-        client.status = "closed"  # else whoever deletes it would wait for its end, and be told of that
+        client.status = "closed"  # else its deletion would wait for its end, and log that
         begun.set_exception(error)
     else:
         begun.set_result(client)
@@ -97,7 +96,7 @@ _BEGUN, _ENDED = "begun", "ended"
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a worker has not even begun: another installation, or a piece that was begun often enough."""
+    """Why a worker has not started a piece: another installation, or a piece that was tried often enough."""
 
     worker: str
     installed: Installation
@@ -106,17 +105,17 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of a piece."""
+    """The outcome of a piece."""
 
     result: Any | None
     fault: PieceFault | None
 
 
 def attempt(pickled: bytes, topic: str, wanted: Installation) -> Answer | Refusal:
-    """Do a piece and return what came of it.
+    """Do a piece and return its outcome.
 
-    The scheduler keeps under ``topic`` which workers have begun and which have come to an end: the others have died
-    under the piece. A result that was lost with a worker, before it was fetched, does not count as such.
+    The scheduler stores under ``topic`` which workers have started and which have finished: the others have died during
+    the piece. A result that was lost with its worker, before it was fetched, does not count as such.
     """
     from distributed import get_client, get_worker
 
@@ -146,9 +145,9 @@ def _answer(piece: Job, worker: str) -> Answer:
 
 
 WITHOUT_WORKERS_S = 300
-"""How long a cluster may be without any worker, s (decision): some begin workers only when there is work."""
+"""How long a cluster may be without any worker, s (decision): some start workers only when there is work."""
 SAME_S = 60
-"""How long all workers together may take to tell what is installed there, s (decision)."""
+"""How long all workers together may take to report their installations, s (decision)."""
 _POLL_S = 0.1
 _LOOK_S = 2.0
 _SAME = "install the same version on all machines, and start the workers again"
@@ -161,7 +160,7 @@ def on_cluster(
 ) -> None:
     """Do pieces by a cluster; the arguments and the end are those of ``run_pieces``.
 
-    Dask itself begins a piece again whose worker is lost, and may do a piece twice; ``take`` gets the first answer.
+    Dask itself restarts a piece whose worker is lost, and may do a piece twice; ``take`` gets the first result.
 
     Raises:
         ClusterFault: Dask is not installed; the scheduler cannot be reached, or is lost; a worker has another version.
@@ -178,7 +177,7 @@ def on_cluster(
                     cluster.require_alive(_POLL_S)
                     continue
                 result, fault = cluster.outcome(pieces[number], futures[number])
-                del futures[number]  # which lets the cluster forget it
+                del futures[number]  # so the cluster forgets it
                 take(number, JobResult(pieces[number], result, fault))
         finally:
             cluster.give_up(list(futures.values()))
@@ -186,7 +185,7 @@ def on_cluster(
 
 @contextmanager
 def _connected(scheduler: str) -> Iterator[_Cluster]:
-    """Connect to a scheduler while the block lasts; what Dask logs meanwhile we say in our own words."""
+    """Connect to a scheduler while the block lasts; Dask's log messages are suppressed, our errors replace them."""
     loggers = {name: logging.getLogger(name) for name in _LOGGERS}
     levels = {name: logger.level for name, logger in loggers.items()}
     for logger in loggers.values():
@@ -214,10 +213,10 @@ class _Cluster:
         self._without_workers_s = 0.0
 
     def require_same(self) -> None:
-        """Make sure that each worker that is there has the installation that we have.
+        """Check that each present worker has the same installation as this machine.
 
         Raises:
-            ClusterFault: one has another, or none, or does not answer.
+            ClusterFault: one has another, or none, or does not respond.
         """
         try:
             answers = within(SAME_S, lambda: self._client.run(installation, on_error="return"))
@@ -230,14 +229,14 @@ class _Cluster:
                 raise self._unlike(worker, found)
 
     def submit(self, piece: Job, number: int, over: Callable[[int], None]) -> Any:
-        """Hand a piece to the cluster; return its future. ``over`` is told its number, in another thread."""
+        """Submit a piece to the cluster; return its future. ``over`` gets its number at the end, in another thread."""
         key = f"automax-{self._run}-{number}"
         future = self._client.submit(attempt, pickle.dumps(piece), key, self._own, key=key, pure=False)
         future.add_done_callback(lambda _: over(number))
         return future
 
     def outcome(self, piece: Job, future: Any) -> tuple[object, PieceFault | None]:
-        """Return what came of a piece that is over: its result, or its fault.
+        """Return the outcome of a piece that has ended: its result, or its fault.
 
         Raises:
             ClusterFault: the cluster is lost, or the worker has another installation.
@@ -255,7 +254,7 @@ class _Cluster:
         return None, death_of(piece.name, f"its workers have died ({', '.join(found.deaths)})")
 
     def require_alive(self, waited_s: float = 0.0) -> None:
-        """Make sure that there is a scheduler, and before long a worker; ``waited_s`` (s) went by without an answer.
+        """Check that there is a scheduler, and before long a worker; ``waited_s`` (s) have passed without a result.
 
         Raises:
             ClusterFault: there is none.
@@ -277,7 +276,7 @@ class _Cluster:
             raise ClusterFault("AMX6853", self._scheduler, what, f"start some: `dask worker {self._scheduler}`")
 
     def give_up(self, futures: list[Any]) -> None:
-        """Let the cluster forget pieces that are not done."""
+        """Cancel pieces that are not done."""
         if futures and self._client.status == "running":
             with suppress(Exception):
                 self._client.cancel(futures, force=True)
@@ -293,7 +292,7 @@ class _Cluster:
 
 
 def _other_machine(worker: str, found: Installation, own: Installation) -> str:
-    """Say in what a worker with the same sources differs."""
+    """Return a message about how a worker with the same sources differs."""
     if found.python != own.python:
         return f"worker {worker} has {found.python}, here is {own.python}"
     if found.numpy != own.numpy:
@@ -305,7 +304,7 @@ def _other_machine(worker: str, found: Installation, own: Installation) -> str:
 
 
 def _fault(piece: Job, error: Exception) -> PieceFault:
-    """Return the fault of a piece that Dask has not brought to an answer of ours."""
+    """Return the fault of a piece for which Dask returned an error instead of an outcome."""
     if type(error).__name__ == "KilledWorker":
         return death_of(piece.name, "its workers have died")
     return fault_of(piece.name, error)

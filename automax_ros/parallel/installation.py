@@ -1,4 +1,4 @@
-"""Which installation of the package this is: machines that work on one thing have the same, and compute the same."""
+"""Identifies the installation of the package: machines that share work need the same one, and equal results."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import numpy as np
 import automax_ros
 
 _ARGUMENTS = tuple(number * scale / 7 for scale in (0.01, 1.0, 100.0) for number in range(-60, 61))
-"""What functions are asked for: small and large, of both signs, most without an end in binary."""
+"""The arguments of the functions: small and large, of both signs, most without a finite binary form."""
 _MATH: tuple[Callable[[float], float], ...] = (
     *(math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.sinh, math.cosh, math.tanh),
     *(math.exp, math.expm1, math.log, math.log1p, math.log2, math.log10, math.sqrt),
@@ -27,11 +27,11 @@ _NUMPY = (np.sin, np.cos, np.tan, np.arctan, np.exp, np.log, np.sqrt, np.cumsum,
 
 @dataclass(frozen=True)
 class Installation:
-    """The version of the package, a SHA-256 of all its sources, what executes them, and what that computes.
+    """The version of the package, a SHA-256 of all its sources, the interpreter and NumPy, and their results.
 
     ``results`` is a SHA-256 of values of functions of the C library and of NumPy, bit for bit: they differ in their
     last bits from one C library or processor to the next (decision: whoever has others is refused, be it that the
-    work at hand asks for none). The defaults are what an older version of the package tells.
+    work at hand asks for none). The defaults are those of an older version of the package.
     """
 
     version: str
@@ -46,7 +46,7 @@ class Installation:
 
 @lru_cache(maxsize=1)
 def installation() -> Installation:
-    """Return what is installed here."""
+    """Return the installation of this machine."""
     folder = Path(automax_ros.__file__).parent
     found = hashlib.sha256()
     for path in sorted(folder.rglob("*.py")):
@@ -58,7 +58,7 @@ def installation() -> Installation:
 
 
 def results_digest() -> str:
-    """Return a SHA-256 of what functions give for a fixed set of arguments."""
+    """Return a SHA-256 of the results of functions for a fixed set of arguments."""
     found = hashlib.sha256(b"".join(struct.pack("<d", value) for value in _results()))
     arguments = np.array(_ARGUMENTS)
     with np.errstate(all="ignore"):
@@ -69,7 +69,7 @@ def results_digest() -> str:
 
 
 def _results() -> Iterator[float]:
-    """Return the values of the C library's functions, 0 where there is none."""
+    """Yield the values of the C library's functions, 0 where they have none."""
     for argument in _ARGUMENTS:
         for function in _MATH:
             yield _value(partial(function, argument))

@@ -1,7 +1,4 @@
-"""What is wrong with a cluster, as errors that say what to do.
-
-A piece of work, what became of it, and where pieces are done.
-"""
+"""A piece of work, its outcome, where pieces are done, and the errors of a cluster."""
 
 from __future__ import annotations
 
@@ -15,14 +12,14 @@ from automax_ros.core.text import printable
 from automax_ros.core.user_error import UserError
 
 MOST_TRIES = 2
-"""How often a piece is begun whose worker dies under it (decision: whatever kills workers shall not kill them all)."""
+"""How often a piece is started if its workers die (decision: whatever kills workers shall not kill them all)."""
 
 
 @dataclass(frozen=True)
 class Job:
     """One piece: ``work``, a function of a module, called with ``arguments``; all of it, and the result, is pickled.
 
-    ``name`` is what the person is told; it should be unlike that of every other piece.
+    ``name`` identifies it in messages; it should be unlike that of every other piece.
     """
 
     name: str
@@ -32,9 +29,9 @@ class Job:
 
 @dataclass(frozen=True)
 class PieceFault:
-    """Why a piece has no result: the piece's name, the error of its work with its kind, and the worker that told it.
+    """Why a piece has no result: the piece's name, the error of its work with its kind, and the worker it came from.
 
-    ``died`` says that the work told nothing: each worker that began it has died. ``trace`` is for developers.
+    ``died``: there was no report, because each worker that started it has died. ``trace`` is for developers.
     """
 
     piece: str
@@ -51,7 +48,7 @@ class PieceFault:
 
 @dataclass(frozen=True)
 class JobResult:
-    """A piece that is over: with its result, or with its fault."""
+    """A piece that has ended: with its result, or with its fault."""
 
     piece: Job
     result: Any | None = None
@@ -62,7 +59,7 @@ class JobResult:
 class Workers:
     """Where pieces are done: by the cluster of a Dask ``scheduler``, else by ``jobs`` processes of this machine.
 
-    ``jobs`` of 1 is this process itself, None as many as there are cores for it.
+    ``jobs`` of 1 is this process itself, None one process per usable core.
     """
 
     jobs: int | None = 1
@@ -72,35 +69,35 @@ class Workers:
         """Refuse less than one job.
 
         Raises:
-            ValueError: there are none.
+            ValueError: ``jobs`` is less than 1.
         """
         if self.jobs is not None and self.jobs < 1:
             raise ValueError(f"{self.jobs} jobs: at least 1")
 
     @property
     def processes(self) -> int:
-        """How many processes of this machine work side by side."""
+        """The number of processes of this machine that work in parallel."""
         return self.jobs if self.jobs is not None else usable_cores()
 
 
 def usable_cores() -> int:
-    """Return how many cores of this machine the process may use."""
+    """Return the number of cores of this machine that the process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def fault_of(name: str, error: Exception, worker: str = "") -> PieceFault:
-    """Return what an error of a piece's work tells."""
+    """Return the fault of a piece whose work raised an error."""
     trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
     return PieceFault(name, type(error).__name__, str(error), worker, trace)
 
 
 def death_of(name: str, what: str, worker: str = "") -> PieceFault:
-    """Return the fault of a piece whose workers died under it as often as it may be tried."""
+    """Return the fault of a piece whose workers died as often as it may be tried."""
     return PieceFault(name, "WorkerDied", f"{what}, {MOST_TRIES} times; it is not tried again", worker, died=True)
 
 
 def result_of(piece: Job, worker: str = "") -> JobResult:
-    """Do a piece here and now."""
+    """Do a piece in this process."""
     try:
         return JobResult(piece, piece.work(*piece.arguments))
     except Exception as error:
@@ -108,7 +105,7 @@ def result_of(piece: Job, worker: str = "") -> JobResult:
 
 
 class ClusterFault(UserError):
-    """Pieces cannot be handed to a cluster: ``place`` is the scheduler's address.
+    """Pieces cannot be given to a cluster: ``place`` is the scheduler's address.
 
     ``code`` is AMX6851 to AMX6854, AMX6857 or AMX6858.
     """

@@ -1,13 +1,11 @@
 """Pieces done by processes of this machine, each of which gets one piece after the other.
 
-Not by concurrent.futures: when one process dies its pool gives up all of them and cannot say which piece it was.
+concurrent.futures is not used: if one process dies, its pool abandons all and cannot report the piece.
 
-The processes that do pieces on this machine: copies of this one where that is safe, else fresh interpreters.
-
-A copy (fork) is ready after some milliseconds with all that is imported and prepared here; a fresh interpreter imports
-it again for a second. A copy is safe only where nothing else runs in this process, which could hold a lock for ever in
-the copy: no other thread of Python, and none of a library (decision). Threads of numerical libraries that end before a
-fork by themselves, as OpenBLAS's do, do not count.
+The processes are copies of this one if that is safe, else fresh interpreters. A copy (fork) is ready after some
+milliseconds with all that is imported and prepared here; a fresh interpreter imports it again for a second. A copy is
+safe only if nothing else runs in this process, which could hold a lock for ever in the copy: no other thread of Python,
+and none of a library (decision). Threads of numerical libraries that end before a fork, as OpenBLAS's do, do not count.
 """
 
 from __future__ import annotations
@@ -31,17 +29,17 @@ from automax_ros.parallel.job import MOST_TRIES, Job, JobResult, PieceFault, dea
 from automax_ros.parallel.worker import work
 
 _THREADS = Path("/proc/self/task")
-"""A name for each thread of this process; where it is missing, processes are fresh."""
+"""A folder with a name for each thread of this process; without it, processes are fresh interpreters."""
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _PROGRAM = (
     "import sys; sys.path[:] = sys.argv[2:]; from multiprocessing.connection import Connection; "
     "from automax_ros.parallel.worker import work; work(Connection(int(sys.argv[1])))"
 )
-"""What a fresh one executes: nothing is imported from the folder in which it begins, only from where we import."""
+"""The program of a fresh interpreter: it imports only from our import path, not from its working folder."""
 
 
 class Process(Protocol):
-    """A process that was begun."""
+    """A process that was started."""
 
     def kill(self) -> int:
         """End it at once; return its exit code, negative for a signal."""
@@ -49,15 +47,15 @@ class Process(Protocol):
 
 
 def begin(end: Connection, ours: Iterable[Connection]) -> Process:
-    """Begin a process that does the pieces that come over ``end``; ``ours`` are connections that it shall not keep.
+    """Start a process that does the pieces received from ``end``; ``ours`` are connections that it must close.
 
-    It is in a session of its own: Ctrl-C at the terminal comes to us alone, and we end it.
+    It has its own session: Ctrl-C at the terminal reaches only this process, which ends it.
     """
     return _copy(end, ours) or _Fresh(end)
 
 
 class _Fresh:
-    """An interpreter of its own."""
+    """A fresh interpreter."""
 
     def __init__(self, end: Connection) -> None:
         self._process = subprocess.Popen(
@@ -84,14 +82,14 @@ class _Copy:
             os.kill(self._pid, signal.SIGKILL)
             return os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
         except (ProcessLookupError, ChildProcessError):
-            return 0  # nobody is told how it has ended where a program ignores SIGCHLD
+            return 0  # the exit code is unknown if a program ignores SIGCHLD
 
 
 def _copy(end: Connection, ours: Iterable[Connection]) -> Process | None:
-    """Begin a copy; None where it would not be safe, or the machine does not make one."""
+    """Start a copy; return None if that would not be safe, or fails."""
     if threading.active_count() != 1 or not _THREADS.is_dir():
         return None
-    # A copy shall not be interrupted as if it were this process.
+    # A copy must not be interrupted as if it were this process.
     held = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
     try:
         pid = os.fork()
@@ -104,12 +102,12 @@ def _copy(end: Connection, ours: Iterable[Connection]) -> Process | None:
     copy = _Copy(pid)
     if len(list(_THREADS.iterdir())) == 1:
         return copy
-    copy.kill()  # threads that Python does not know ran at the fork: the copy has done nothing yet
+    copy.kill()  # threads unknown to Python were running at the fork: the copy has done nothing yet
     return None
 
 
 def _work_and_end(end: Connection, ours: Iterable[Connection], held: Iterable[int]) -> NoReturn:
-    """Be a worker, and never come back: what the process does at its end is done by the one that was copied."""
+    """Work, and exit without returning: cleaning up at exit is left to the process that was copied."""
     try:
         os.setsid()
         for number in _ENDING:
@@ -121,14 +119,14 @@ def _work_and_end(end: Connection, ours: Iterable[Connection], held: Iterable[in
         null = os.open(os.devnull, os.O_RDWR)
         os.dup2(null, 0)
         os.dup2(null, 1)
-        gc.freeze()  # what came with the copy is never looked through, so its memory stays shared
+        gc.freeze()  # copied objects are never traversed, so their memory stays shared
         work(end)
     finally:
         os._exit(1)
 
 
 _POLL_S = 0.1
-"""How often ``should_stop`` is asked."""
+"""Seconds between two calls of ``should_stop``."""
 
 
 def in_processes(
@@ -162,7 +160,7 @@ def _take_from(
     todo: deque[tuple[int, int]],
     take: Callable[[int, JobResult], None],
 ) -> None:
-    """Take what a worker tells, or put another one in the place of one that has died."""
+    """Receive the outcome from a worker, or replace the worker if it has died."""
     worker = workers[end]
     assert worker.task is not None
     number, tries = worker.task
@@ -189,17 +187,17 @@ def _begin(workers: dict[Connection, _Worker]) -> None:
 
 
 class _Worker:
-    """A process that does one piece after the other; ``task`` is the piece under way and its try."""
+    """A process that does one piece after the other; ``task`` is its present piece and the number of the try."""
 
     def __init__(self, ends: list[Connection]) -> None:
-        """Begin it; ``ends`` are those of the connections to others."""
+        """Start it; ``ends`` are those of the connections to others."""
         self.end, other = multiprocessing.Pipe()
         self.task: tuple[int, int] | None = None
         with other:
             self._process = begin(other, [self.end, *ends])
 
     def give(self, pieces: Sequence[Job], number: int, tries: int) -> None:
-        """Let it do a piece; one that has died by now is found out when it is listened to."""
+        """Send it a piece; if it has died by now, that is detected when its answer is read."""
         self.task = number, tries
         payload = pickle.dumps(pieces[number])
         try:
@@ -208,11 +206,11 @@ class _Worker:
             return
 
     def answer(self) -> tuple[object, PieceFault | None]:
-        """Return what came of the piece: its result, or its fault.
+        """Return the outcome of the piece: its result, or its fault.
 
         Raises:
             EOFError: the process has died.
-            OSError: likewise, within its answer.
+            OSError: the process has died while it answered.
         """
         answer: tuple[object, PieceFault | None] = pickle.loads(self.end.recv_bytes())
         return answer

@@ -1,4 +1,4 @@
-"""Does pieces, wherever: the one door to the forms below."""
+"""Does pieces in this process, in local processes or by a cluster: the entry point to all three."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ def run_pieces(
     on_done: Callable[[JobResult], None] = lambda _: None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> list[JobResult]:
-    """Do pieces side by side; return what became of them in their order, each once.
+    """Do pieces in parallel; return their outcomes in the order of the pieces, each once.
 
-    ``on_done`` is told of each as it comes, here, in this thread. An error of a piece's work is the fault of this piece
-    and ends nothing. A worker that dies (killed, out of memory) costs its piece another try, at most ``MOST_TRIES`` in
-    all. When ``should_stop`` says so, which is asked every now and then (between two pieces where ``jobs`` is 1), what
-    is under way is given up, and only the pieces that are done are returned; so it is with every exception of
-    ``on_done`` and with Ctrl-C, which pass through. No process is left over in any of these cases.
+    ``on_done`` is called with each outcome as it arrives, in this thread. An error of a piece's work is the fault of
+    this piece and ends nothing else. If a worker dies (killed, out of memory), its piece is tried again, at most
+    ``MOST_TRIES`` times in all. If ``should_stop``, which is called now and then (between two pieces if ``jobs`` is 1),
+    returns True, pieces in progress are abandoned, and only those that are done are returned; an exception of
+    ``on_done`` and Ctrl-C also abandon them, and are raised. No process is left over in any of these cases.
 
     Raises:
         ClusterFault: Dask is not installed, or the cluster cannot be used.

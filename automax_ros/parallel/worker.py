@@ -1,4 +1,4 @@
-"""The program of a local worker process: does the pieces that it is given until nobody is left who gives any."""
+"""The program of a local worker process: does the pieces that it receives until the other end is closed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from automax_ros.parallel.job import fault_of, result_of
 
 
 def work(end: Connection) -> None:
-    """Do the pieces that come over a connection; return when its other end is closed."""
+    """Do the pieces received from a connection; return when its other end is closed."""
     threading.Thread(target=_end_when_alone, args=(end.fileno(),), daemon=True).start()
     with end:
         while True:
@@ -23,7 +23,7 @@ def work(end: Connection) -> None:
 
 
 def _answer(payload: bytes) -> bytes:
-    """Do a pickled piece; return its result and its fault, pickled, where the result can be."""
+    """Do a pickled piece; return its result and its fault, pickled, or a fault if the result cannot be pickled."""
     piece = pickle.loads(payload)
     done = result_of(piece)
     try:
@@ -33,7 +33,7 @@ def _answer(payload: bytes) -> bytes:
 
 
 def _end_when_alone(number: int) -> None:
-    """End this process, whatever it does, when the one that gives it pieces has ended, be it by a signal."""
+    """End this process, whatever it is doing, when the process that sends pieces has ended, also by a signal."""
     alone = select.poll()
     alone.register(number, 0)  # nothing but the end of the other side
     alone.poll()

@@ -1,10 +1,10 @@
-"""What a rack tells a launch file: `RackStopped`, an event of the package launch.
+"""`RackStopped`, the event of the package launch that reports a STOP ALL of a rack to a launch file.
 
     from automax_ros.ros.launch_events import RackStopped
     RegisterEventHandler(EventHandler(matcher=RackStopped.is_event, entities=[...]))
 
-`rack.launch.py` emits it for each STOP ALL that the rack shows, whoever caused it; `text` is what it shows. The end of
-the process, by a fault with exit code 1 once it is asked to end, is launch's own `OnProcessExit`.
+`rack.launch.py` emits it for each STOP ALL that the rack prints, whatever its cause; `text` is the printed line. The
+end of the process, which after a fault exits with code 1 once it is asked to end, is launch's own `OnProcessExit`.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ class RackStopped(Event):  # type: ignore[misc]
     name = "automax_ros.RackStopped"
 
     def __init__(self, text: str) -> None:
-        """Keep the line that the rack showed."""
+        """Store the line that the rack printed."""
         self.text = text
 
     @staticmethod
     def is_event(event: Any) -> bool:
-        """Return whether an event is one of these: the matcher of an event handler."""
+        """Return whether an event is a ``RackStopped``: the matcher of an event handler."""
         return isinstance(event, RackStopped)
 
 
 def stops_of(output: bytes) -> list[RackStopped]:
-    """Return the STOP ALLs in what a rack has printed; lines of a distributed one begin with a process' name."""
+    """Return the STOP ALLs in the output of a rack; lines of a distributed one begin with a process's name."""
     lines = output.decode(errors="replace").splitlines()
     shown = (line.strip() for line in lines)
     return [RackStopped(line) for line in shown if line.partition(STOP_ALL)[0] == "" or f": {STOP_ALL}" in line]

@@ -1,4 +1,4 @@
-"""An operator for a rack of several processes: requests come to the home and are carried out where their object is."""
+"""The operator of a distributed rack: requests arrive at the home and are forwarded to the process of their object."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from automax_ros.ros.nodes.operator import OperatorNode, OperatorServices
 
 
 def forward_operator(nodes: Sequence[ModuleNode], bus: DistributedMemory) -> OperatorServices | None:
-    """Let the operator's node pass requests on, or serve what it passes on where that node is elsewhere.
+    """Make the operator's node forward requests, or serve forwarded requests if that node is in another process.
 
-    Returns the desk that serves here, to be closed; None where the rack has no operator, or the node closes it.
+    Returns the services created here, to be closed; None if the rack has no operator, or its node closes them.
     """
     rack = nodes[0].site.rack
     memory = next((node for node in nodes if isinstance(node, CommonMemoryNode)), None)

@@ -1,21 +1,21 @@
-"""A rack as ROS 2 nodes in any program: in its context, in its executor.
+"""A rack as ROS 2 nodes: embedded in any program (``RackNodes``), or as a process (``LiveRack``).
 
-rclpy.init()
-executor = SingleThreadedExecutor()
-nodes = RackNodes("rack.yaml")
-nodes.add_to(executor)
-nodes.start()
-executor.spin()        # serves your nodes and the rack's; a thread of the rack's own keeps its pace
-nodes.close()
+``RackNodes`` uses the context and the executor of the program::
 
-One process that is a rack: its nodes in a context and an executor of their own, on the wall clock.
+    rclpy.init()
+    executor = SingleThreadedExecutor()
+    nodes = RackNodes("rack.yaml")
+    nodes.add_to(executor)
+    nodes.start()
+    executor.spin()        # serves your nodes and the rack's; a separate thread scans
+    nodes.close()
 
-Three threads. The calling one scans, on absolute deadlines (``Pacer``): no ROS timer is in the way (they skip ticks on
-a busy host). A second one takes messages and requests in (``MessageIntake``), between two scans. A third one spins the
-executor, which is left with the graph's events. Measured (bench/ros.py): the loop's lateness is the host's own in
-either form; a loop of ``time.sleep`` without ROS oversleeps by 1 to 4 ms as often (the host of a virtual machine takes
-its processor away, with a period of about 0.51 s among others). What a thread of their own gives the scans is that a
-long message, a long conversion or a queue of events does not stand before them.
+``LiveRack`` has its own context and executor, and three threads. The calling one scans, at absolute deadlines
+(``Pacer``), without ROS timers (they skip ticks on a busy host). A second one receives messages and requests
+(``MessageIntake``), between two scans. A third one spins the executor, which only handles events of the graph. Measured
+(bench/ros.py): the loop's lateness is the host's own in either form; a loop of ``time.sleep`` without ROS oversleeps by
+1 to 4 ms as often (the host of a virtual machine takes its processor away, with a period of about 0.51 s among
+others). With a separate thread, scans are not delayed by a long message, a long conversion or a queue of events.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ from automax_ros.runtime.time.pacer import START_LEAD_NS
 from automax_ros.runtime.time.simulated_pacer import SimulatedTime
 
 LOOK_S = 0.02
-"""How often it is looked whether the other processes are there."""
+"""Seconds between two checks whether the other processes are present."""
 
 _Beginning = tuple[Sequence[tuple[str, Value]], "Callable[[], None] | None"]
 """The arguments of ``Rack.start``."""
@@ -72,12 +72,12 @@ _TOGETHER = "a distributed rack keeps the wall clock, by which its processes agr
 
 
 class RackNodes:
-    """The nodes of one rack, and the rack in them.
+    """The nodes of one rack, and the rack itself.
 
-    ``add_to`` an executor and ``start``, then let it spin; ``start`` with ``paced=False`` and ``run`` scans on the
-    calling thread. Messages and requests come in on a thread of their own (``MessageIntake``), whatever the executor
-    does. ``close`` in any case (a ``with`` block does). Whoever touches ``rack`` meanwhile holds ``lock``: scans and
-    messages from outside do, so nothing ever falls into a scan.
+    ``add_to`` an executor and ``start``, then spin it; or ``start`` with ``paced=False`` and ``run``, which scans on
+    the calling thread. Messages and requests are received on a separate thread (``MessageIntake``), whatever the
+    executor does. Always call ``close`` (a ``with`` block does). Hold ``lock`` to access ``rack`` meanwhile: scans and
+    messages from outside do, so nothing ever interrupts a scan.
 
     Attributes:
         rack: the rack.
@@ -85,7 +85,7 @@ class RackNodes:
         health: what went wrong so far.
         nodes: the node of each module.
         manager: the node ``rack``; None where common memory is in another process.
-        notes: what the person should know of the command line.
+        notes: remarks on the command line, for the user.
     """
 
     def __init__(
@@ -103,20 +103,20 @@ class RackNodes:
         Args:
             rack: a rack that was not started, or the path of its YAML file.
             context: the context of all nodes, initialised; rclpy's default one if None.
-            arguments: what the nodes are told by the command line; this process's own one if None, as rclpy does. The
-                namespace is that of a rack that is given by its file; a rack that is given has its own.
-            manager: the node ``rack`` where the caller has one, who then sees to its state; else one is made here.
+            arguments: the ROS arguments of the nodes; those of this process if None, as in rclpy. Their namespace is
+                for a rack that is given by its file; a ``Rack`` has its own.
+            manager: the node ``rack`` if the caller has one and manages its state; else one is created here.
             seating: the processes of a distributed rack; ``rack`` is the part of this one.
-            simulated: the rack's own time in place of the wall clock, which it then tells on ``/clock``.
+            simulated: simulated time instead of the wall clock, which is then published on ``/clock``.
 
         Raises:
             RackError: the YAML file or a task has errors, which ``findings`` holds.
-            RosArgumentsError: the command line is not one, gives a tunable a value that its task refuses, or lets a
+            RosArgumentsError: the command line is invalid, gives a tunable a value that its task refuses, or makes a
                 distributed rack follow ``/clock``.
         """
         if arguments is None:
             arguments = split_arguments(sys.argv)[1]
-        if simulated is not None:  # whoever sends /clock does not follow it
+        if simulated is not None:  # a rack that publishes /clock does not follow it
             arguments = arguments.without(SIM_TIME)
         self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack), arguments)
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
@@ -157,7 +157,7 @@ class RackNodes:
         self.notes = self._begin_with(arguments)
 
     def _begin_with(self, arguments: RosArguments) -> list[str]:
-        """Give tunables what the command line says, and return what of it reaches nobody."""
+        """Set tunables to the values of the command line, and return messages about its unused parameters."""
         try:
             tuned = [node for node in self.nodes if isinstance(node, ProcessorNode)]
             tune_at_start(arguments, self.rack.config.namespace, tuned)
@@ -173,11 +173,11 @@ class RackNodes:
 
     @property
     def lock(self) -> AbstractContextManager[None]:
-        """What holds off scans and messages: ``with nodes.lock``. The rack's time is the present then."""
+        """A context that holds off scans and messages: ``with nodes.lock``. Rack time is the present in it."""
         return self._site.between_scans()
 
     def add_to(self, executor: Any) -> None:
-        """Let an executor of rclpy serve the nodes: any kind, alone or with nodes of your own."""
+        """Add the nodes to an rclpy executor of any kind, alone or with nodes of your own."""
         self._executor = executor
         for node in (*self.nodes, *self._own):
             executor.add_node(node)
@@ -190,13 +190,13 @@ class RackNodes:
         *,
         paced: bool = True,
     ) -> None:
-        """Send what stands at the start and put the rack into RUN; rack time 0 comes in a moment.
+        """Publish the state at the start and put the rack into RUN; rack time 0 follows shortly.
 
-        A rack that follows ``/clock`` begins with its first message: ``run``, or the thread, waits for it.
+        A rack that follows ``/clock`` starts with its first message: ``run``, or the thread, waits for it.
 
         Args:
-            settings: those of ``Rack.start``, which raises what it says.
-            first: what it calls before tasks run; nobody does in a rack that others run already.
+            settings: those of ``Rack.start``, whose exceptions are raised.
+            first: called before tasks run; not in a rack that already runs in other processes.
             paced: whether a thread scans from then on; without one, ``run`` does.
         """
         self._door.open()
@@ -229,7 +229,7 @@ class RackNodes:
         return self._begun
 
     def activate(self) -> Pending | None:
-        """Put all tasks that rest into RUN, those in other processes too, whose answers are waited for.
+        """Put all stopped tasks into RUN, also those in other processes, whose answers are awaited.
 
         Raises:
             OperationRefused: the rack refuses it (``Operations.run_all``).
@@ -252,10 +252,10 @@ class RackNodes:
             self.rack.operations.stop_all(DEACTIVATED)
 
     def await_others(self, should_stop: Callable[[], bool]) -> bool:
-        """Wait until the other processes of a distributed rack are there; FALSE where asked to stop.
+        """Wait until the other processes of a distributed rack are present; return False if asked to stop.
 
         Raises:
-            SeatTaken: another process of this run has the same modules.
+            ProcessAlreadyRuns: another process of this run has the same modules.
         """
         bus = self.bus
         while bus is not None and not bus.epoch_ns:
@@ -267,7 +267,7 @@ class RackNodes:
         return True
 
     def _start_together(self, bus: DistributedMemory, beginning: _Beginning) -> None:
-        """Start at the instant that all processes know, or join those that run already."""
+        """Start at the instant agreed by all processes, or join those that already run."""
         self._pacer.begin(bus.epoch_ns - time.time_ns())
         self.stream.in_run(bus.run_id)
         self.stream.begin(bus.epoch_ns)
@@ -285,17 +285,17 @@ class RackNodes:
         on_idle: Callable[[int], None] | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Scan on this thread until rack time ``until_ns``, or asked to stop (``Pace.run``)."""
+        """Scan on this thread until rack time ``until_ns``, or until asked to stop (``Pace.run``)."""
         if not self._clock.wait(should_stop, on_idle):
             return
         self._begin()
         self._pacer.run(until_ns, on_idle, should_stop)
 
     def close(self, *, spun: bool = True) -> None:
-        """Stop the tasks, send what is still to be sent, and leave the graph; a second time this does nothing.
+        """Stop the tasks, publish the last messages, and leave the graph; a second call does nothing.
 
         Args:
-            spun: whether a thread may be spinning the executor meanwhile, which then lets go of the nodes first.
+            spun: whether a thread may be spinning the executor, which must then release the nodes first.
         """
         if self._closed:
             return
@@ -351,7 +351,7 @@ class RackNodes:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
-            if self._context.ok():  # else ROS was shut down, and nobody is left to be told
+            if self._context.ok():  # else ROS was shut down, and a report reaches nobody
                 self._report(f"rack {self.rack.config.name} has ended", error)
 
     def _report(self, what: str, error: Exception) -> None:
@@ -370,9 +370,9 @@ RCLError: type[Exception] = rclpy_implementation.RCLError
 
 
 class LiveRack:
-    """A rack with its nodes in this process.
+    """A rack and its nodes, as this process.
 
-    Make it, ``start`` it, then ``run``; ``close`` in any case. ``on_idle`` or a callback sets ``stopping``.
+    Create it, ``start`` it, then ``run``; always call ``close``. ``on_idle`` or a callback sets ``stopping``.
     """
 
     def __init__(
@@ -389,11 +389,11 @@ class LiveRack:
 
         Args:
             rack: a rack that was not started.
-            arguments: what the nodes are told.
-            seating: the processes of a distributed rack, as ``RackNodes`` takes it.
-            process: the caller's part in the graph, who closes it; without one it is this rack's own.
-            manager: the caller's node ``rack``, as ``RackNodes`` takes it.
-            simulated: the rack's own time, as ``RackNodes`` takes it.
+            arguments: the ROS arguments of the nodes.
+            seating: the processes of a distributed rack, as for ``RackNodes``.
+            process: the caller's context and executor, which the caller closes; the rack's own if None.
+            manager: the caller's node ``rack``, as for ``RackNodes``.
+            simulated: simulated time, as for ``RackNodes``.
 
         Raises:
             RosUnavailable: ROS cannot be initialised, or refuses a node, a topic or a service.
@@ -424,32 +424,32 @@ class LiveRack:
 
     @property
     def missing(self) -> list[str]:
-        """The other processes of a distributed rack that are not there."""
+        """The other processes of a distributed rack that are absent."""
         return self.bus.missing if self.bus is not None else []
 
     @property
     def is_joining(self) -> bool:
-        """Whether the rack ran already in other processes when this one began."""
+        """Whether the rack already ran in other processes when this one started."""
         return self.bus is not None and self.bus.joining
 
     def await_others(self, should_stop: Callable[[], bool]) -> bool:
-        """Wait for the other processes of a distributed rack; FALSE where asked to stop meanwhile.
+        """Wait for the other processes of a distributed rack; return False if asked to stop.
 
         Raises:
-            SeatTaken: another process of this run has the same modules.
+            ProcessAlreadyRuns: another process of this run has the same modules.
         """
         return self.nodes.await_others(should_stop)
 
     def start(self, settings: list[tuple[str, Value]], first: Callable[[], None] | None = None) -> None:
-        """Begin the stream and put the rack into RUN (``Rack.start``); rack time starts in a moment."""
+        """Begin the stream and put the rack into RUN (``Rack.start``); rack time 0 follows shortly."""
         self.nodes.start(settings, first, paced=False)
 
     def run(self, duration_ns: int | None, on_idle: Callable[[int], None]) -> None:
-        """Let the rack live until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""
+        """Run the rack until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""
         self.nodes.run(duration_ns, on_idle, lambda: self.stopping)
 
     def close(self) -> None:
-        """Stop the tasks, send what is still to be sent, destroy the nodes, and end ROS unless the caller does."""
+        """Stop the tasks, publish the last messages, destroy the nodes, and shut ROS down unless the caller does."""
         with self._process.resting():
             self.nodes.close(spun=False)
         self._leave()

@@ -1,1 +1,1 @@
-"""What executes tasks: common memory, time, scans."""
+"""Execution of tasks: common memory, time, scans."""

@@ -1,1 +1,1 @@
-"""What the processes of one rack exchange."""
+"""The messages that the processes of one rack exchange."""

@@ -1,11 +1,11 @@
-"""What processes of one rack exchange, as messages and back. Both ends hold the same rack file: variables are numbers.
+"""Converts the data that processes of one rack exchange to messages and back, and checks received messages.
 
-Times are instants of rack time on the wire, too: all processes of a run share its beginning.
+Both ends have the same rack file, so variables are identified by numbers. Times in messages are instants of rack time:
+all processes of a run share its start.
 
-What of a message between processes can be true: seats and slots are the rack's, times lie where a run's can.
-
-Whoever can publish on the bus can send any numbers. What cannot be true is refused where it comes in, here alone: a
-time that no later one can exceed, for example, would decide for ever who is right (decision: limits as below).
+Any program that can publish on the bus can send any numbers. Seats and slots that the rack does not have, and times
+outside of a run, are refused on reception, only here: a time that no later one can exceed, for example, would override
+all later writes for ever (decision: limits as below).
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from automax_ros.rack.distributed.link import Batch, HeldForce, ImageCopy, StopS
 from automax_ros.rack.distributed.versions import VersionedValue
 
 AHEAD_NS = 60 * NS_PER_S
-"""So far ahead of this process's time another's may be: clocks of hosts differ, and a process may have been held up."""
+"""How far another process's time may be ahead of this one's: hosts' clocks differ, and a process may be held up."""
 LONGEST_RUN_NS = 10 * 366 * 24 * 3600 * NS_PER_S
-"""The longest run of a rack, where its start is not known."""
+"""The longest run of a rack, if its start is unknown."""
 LARGEST_SEQUENCE = 1 << 62
 LAST_STATE = 3
 """The last of the states of a process, LEAVING."""
 INSTALLED_NS = -1
-"""The time of what a rack has as it is installed."""
+"""The time of values that a rack has at its installation."""
 
 
 class BusLimits:
-    """Judges messages. ``seats`` are the slots of all processes of the rack, by the slot that names each."""
+    """Checks messages. ``seats`` are the slots of all processes of the rack, by the slot that names each."""
 
     def __init__(self, seats: Mapping[int, tuple[int, ...]]) -> None:
-        """Take the processes of the rack."""
+        """Store the processes of the rack."""
         self._seats = {seat: tuple(sorted(slots)) for seat, slots in seats.items()}
-        self._slots = {0}.union(*seats.values())  # 0 stands with what is as installed
+        self._slots = {0}.union(*seats.values())  # 0 is that of values as installed
 
     def of_presence(self, presence: Presence, wall_ns: int, latest_ns: int) -> str:
-        """Return what of a process's word cannot be true, "" where all can.
+        """Return why a presence cannot be valid, "" if it can.
 
         Args:
-            presence: the word.
-            wall_ns: the wall clock here.
-            latest_ns: the latest rack time that there can be.
+            presence: the message.
+            wall_ns: the wall clock of this process.
+            latest_ns: the latest possible rack time.
         """
         slots = self._seats.get(presence.seat)
         if slots is None:
@@ -65,7 +65,7 @@ class BusLimits:
         return ""
 
     def of_write(self, message: BusWrite, latest_ns: int) -> str:
-        """Return what of a write cannot be true, "" where all can."""
+        """Return why a write cannot be valid, "" if it can."""
         if message.seat not in self._seats:
             return f"a write by slot {message.seat}, which is none of the rack"
         if not 0 <= message.stamp <= latest_ns:
@@ -73,7 +73,7 @@ class BusLimits:
         return "a write with a number that none has" if message.sequence > LARGEST_SEQUENCE else ""
 
     def of_image(self, message: BusImage, latest_ns: int) -> str:
-        """Return what of an image cannot be true, "" where all can."""
+        """Return why an image cannot be valid, "" if it can."""
         times = (*message.since_ns, *message.force_since_ns)
         if not all(INSTALLED_NS <= time_ns <= latest_ns for time_ns in times):
             return "an image with a time that cannot be"
@@ -100,7 +100,7 @@ def batch_of(message: BusWrite, texts: Collection[int]) -> Batch:
     """Return the writes of a message; ``texts`` are the views of STRING variables.
 
     Raises:
-        CdrError: it is not one that a process of a rack sends.
+        CdrError: the message is not one that a process of a rack sends.
     """
     try:
         kind = WriteKind(message.kind)
@@ -111,7 +111,7 @@ def batch_of(message: BusWrite, texts: Collection[int]) -> Batch:
 
 
 def image_message(picture: ImageCopy, now_ns: int, run_id: int, process: int, asked_by: int) -> BusImage:
-    """Return what a process holds as a message for the one that has asked."""
+    """Return the image of a process as a message for the process that requested it."""
     values, forces = picture.values, picture.forces
     return BusImage(
         now_ns,
@@ -135,10 +135,10 @@ def image_message(picture: ImageCopy, now_ns: int, run_id: int, process: int, as
 
 
 def picture_of(message: BusImage, texts: Collection[int]) -> ImageCopy:
-    """Return what a process holds; ``texts`` are the views of STRING variables.
+    """Return the image in a message; ``texts`` are the views of STRING variables.
 
     Raises:
-        CdrError: it is not one that a process of a rack sends.
+        CdrError: the message is not one that a process of a rack sends.
     """
     try:
         since = zip(message.since_ns, message.seat, message.order, strict=True)
@@ -155,7 +155,7 @@ def picture_of(message: BusImage, texts: Collection[int]) -> ImageCopy:
 
 
 def standing_of(presence: Presence) -> StopState:
-    """Return how the rack stands by the word of a process."""
+    """Return the operating state of the rack in a process's presence."""
     cause = None
     if presence.stopped:
         code = presence.stopped_code or None
@@ -164,7 +164,7 @@ def standing_of(presence: Presence) -> StopState:
 
 
 def with_standing(presence: Presence, standing: StopState) -> Presence:
-    """Return a process's word with how the rack stands."""
+    """Return a process's presence with the operating state of the rack."""
     cause = standing.cause
     return presence._replace(
         stopped=cause is not None,
@@ -177,7 +177,7 @@ def with_standing(presence: Presence, standing: StopState) -> Presence:
 
 
 def _entries(values: Values, texts: Collection[int]) -> Iterator[tuple[int, int, Value]]:
-    """Yield view, element and value; strings stand apart, in order, with a 0 for each among the numbers."""
+    """Yield view, element and value; strings are in a list of their own, in order, each with a 0 among the numbers."""
     if not len(values.variable) == len(values.element) == len(values.value):
         raise CdrError("values whose parts differ in length")
     strings = iter(values.text)

@@ -1,6 +1,6 @@
-"""The other processes of a distributed rack, as one process knows them from what they say of themselves.
+"""The other processes of a distributed rack, as one process knows them from their presences.
 
-No clock and no ROS: whoever hears a ``Presence`` tells it with the time (ns, monotonic).
+It uses neither a clock nor ROS: the receiver of a ``Presence`` passes it on with the time (ns, monotonic).
 """
 
 from __future__ import annotations
@@ -13,36 +13,36 @@ from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.messages.types.messages import Presence, Stage
 
 BEAT_NS = 20 * NS_PER_MS
-"""How often a process says that it lives."""
+"""Period at which a process publishes its presence."""
 SILENCE_NS = 75 * NS_PER_MS
-"""A process of another host that has said nothing for so long is lost (decision: it is noticed within 100 ms)."""
+"""A process of another host that is silent for this long is lost (decision: it is noticed within 100 ms)."""
 HUNG_NS = 10_000 * NS_PER_MS
-"""One of this host that lives by the kernel's word may be held up for so long (decision): a busy host is not lost."""
+"""A process of this host that still lives may be held up for this long (decision): a busy host is not lost."""
 MISSING_NS = 200 * NS_PER_MS
-"""After this DDS has sent again what was dropped on the way (decision); what is missing then is asked for."""
+"""After this time DDS has sent dropped messages again (decision); those still missing are requested."""
 HELD_UP_NS = 45 * NS_PER_MS
-"""Who was held up for so long itself judges nobody until it has heard what came meanwhile."""
+"""A process that was itself held up this long declares no other lost until it has read what arrived meanwhile."""
 
 
 class PresenceVerdict(enum.Enum):
-    """What a process's word means."""
+    """What a received presence means."""
 
     OWN = "own"
     KNOWN = "known"
     NEW = "new"
     OTHER_RUN = "other run"
-    """A rack of this name that is not of this run."""
+    """It is of a rack of this name, but not of this run."""
     OTHER_FILE = "other file"
     """It has another rack file or other sources."""
     SEAT_TAKEN = "seat taken"
-    """It holds modules that are in this process."""
+    """It has modules that are in this process."""
 
 
 @dataclass
 class Peer:
-    """Another process: what it said last, when, and which of its batches have come.
+    """Another process: its last presence, when that was received, and which of its batches have arrived.
 
-    ``short_since_ns`` is when batches of which it told were first missed, None as long as none is.
+    ``short_since_ns`` is when announced batches were first missed, None as long as none is.
     """
 
     presence: Presence
@@ -53,16 +53,16 @@ class Peer:
 
     @property
     def process(self) -> int:
-        """The number of its life."""
+        """The number of this process, another one after a restart."""
         return self.presence.process
 
     @property
     def stage(self) -> int:
-        """How far it is."""
+        """The stage that it has reached."""
         return self.presence.state
 
     def got(self, sequence: int) -> None:
-        """Note a batch that has come; one that was left out makes a gap."""
+        """Note a batch that has arrived; a skipped number is a gap."""
         self.gap = self.gap or sequence > self.received + 1
         self.received = max(self.received, sequence)
         self.short_since_ns = None
@@ -78,9 +78,9 @@ class Peers:
     """All other processes of one run, by seat.
 
     ``process``, ``seat`` and ``slots`` are this process's own, ``fingerprint`` that of its rack file and sources;
-    ``run_id`` is 0 while it knows of no run: then it joins the one that it hears of. ``lost`` are seats whose process
-    has gone silently and has not come back. ``lives`` tells of a process of this host whether it lives, and None
-    of others.
+    ``run_id`` is 0 while it knows no run: then it joins the first one that a presence names. ``lost`` are seats whose
+    process disappeared without leaving and has not come back. ``lives`` returns whether a process of this host lives,
+    None for others.
     """
 
     process: int
@@ -95,7 +95,7 @@ class Peers:
     _looked_ns: int = 0
 
     def heard(self, presence: Presence, now_ns: int) -> PresenceVerdict:
-        """Take a process's word."""
+        """Process a presence."""
         refused = self._refused(presence)
         if refused is not None:
             return refused
@@ -105,7 +105,7 @@ class Peers:
             self.epoch_ns = presence.epoch_ns
         peer = self.by_seat.get(presence.seat)
         if peer is None or peer.process != presence.process:
-            # What it sent before it was heard has not been taken: the first batch that it tells of is owed.
+            # Batches from before its first presence were not received: the first one that it announces is missing.
             self.by_seat[presence.seat] = peer = Peer(presence, now_ns)
             self.lost.discard(presence.seat)
             found = PresenceVerdict.NEW
@@ -114,11 +114,11 @@ class Peers:
         return found
 
     def is_short(self, presence: Presence) -> bool:
-        """Whether the latest word of a process, if it was accepted, tells of batches that have not been taken here."""
+        """Whether a presence, if it is an accepted one and the latest, announces batches that were not received."""
         return self._told(presence) is not None
 
     def missed(self, presence: Presence, now_ns: int) -> None:
-        """Note that batches of which a word tells are missing, though all that has come here was taken since."""
+        """Note that batches announced by a presence are missing, though all that arrived was read since."""
         peer = self._told(presence)
         if peer is None:
             return
@@ -127,7 +127,7 @@ class Peers:
         peer.gap = peer.gap or now_ns - peer.short_since_ns >= MISSING_NS
 
     def _told(self, presence: Presence) -> Peer | None:
-        """Return the process whose latest word this is, if it tells of batches that have not been taken."""
+        """Return the process whose latest presence this is, if it announces batches that were not received."""
         peer = self.by_seat.get(presence.seat)
         return peer if peer is not None and peer.presence is presence and presence.sequence > peer.received else None
 
@@ -143,7 +143,7 @@ class Peers:
         return None
 
     def look(self, now_ns: int) -> list[Peer]:
-        """Return those that are lost since the last look: they leave the list. To be called at each beat."""
+        """Remove and return the processes lost since the last call. To be called at each beat."""
         held_up = now_ns - self._looked_ns > HELD_UP_NS
         self._looked_ns = now_ns
         gone = [peer for peer in self.by_seat.values() if self._is_gone(peer, now_ns, held_up=held_up)]
@@ -160,7 +160,7 @@ class Peers:
         return not held_up and now_ns - peer.heard_ns > (HUNG_NS if lives else SILENCE_NS)
 
     def of(self, process: int) -> Peer | None:
-        """Return the process of a number, None where it is not of this run."""
+        """Return the process with a number; None if it is not of this run."""
         return next((peer for peer in self.by_seat.values() if peer.process == process), None)
 
     def running(self) -> Iterator[Peer]:
@@ -168,5 +168,5 @@ class Peers:
         return (peer for _, peer in sorted(self.by_seat.items()) if peer.stage == Stage.RUNNING)
 
     def owing(self) -> Peer | None:
-        """Return one of which batches are missing, None where there is none."""
+        """Return a process with missing batches; None if there is none."""
         return next((peer for _, peer in sorted(self.by_seat.items()) if peer.gap), None)

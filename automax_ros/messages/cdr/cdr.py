@@ -1,14 +1,12 @@
 """CDR, the byte form of ROS 2 messages: classic (XCDR1), little-endian, as Fast DDS writes it.
 
-The functions of a type are generated from its definition at first use. Own, not rosbags' serializer: that takes 9 us
-to build and encode a scan of the example, this 2 us; rclpy's takes more than 30 us and needs ROS 2, which the library
-runs without.
+The functions that encode and decode a type are generated from its definition at first use. rosbags' serializer takes
+9 us to build and encode a scan of the example, this one 2 us; rclpy's takes more than 30 us and needs ROS 2, which the
+library runs without.
 
-Generates the functions that turn a message into CDR and back, from its definition, once for each type.
-
-The source is made of field names and structs of our own table of types, never of text that a bag brings. An encoder
-packs a whole message in one ``struct`` call, which is kept for the next message with the same sizes. Where something
-is rare (a text or message inside a sequence, neighbouring sequences of different lengths) it goes part by part.
+The source consists of field names and structs of our own table of types, never of text from a bag. An encoder packs a
+whole message in one ``struct`` call, which is kept for the next message with the same sizes. Rare messages (with a text
+or message inside a sequence, or neighbouring sequences of different lengths) are packed part by part.
 """
 
 from __future__ import annotations
@@ -83,7 +81,7 @@ class _Source:
         self._lines += [" " * (4 * self.indent) + line for line in lines]
 
     def name(self, stem: str, value: object) -> str:
-        """Return a name by which the lines can speak of an object."""
+        """Return a name by which the lines can refer to an object."""
         name = f"{stem}{len(self._objects)}"
         self._objects[name] = value
         return name
@@ -96,9 +94,9 @@ class _Source:
 
 @functools.cache
 def encoder(type_name: str) -> Encode:
-    """The function that turns a message of the type into bytes; a caller in a hurry keeps it.
+    """Return the function that encodes a message of the type; fast callers keep it.
 
-    A plain tuple of all fields is as good as an instance of the class. Raises CdrError if a value does not fit.
+    It also accepts a plain tuple of all fields instead of an instance. It raises CdrError if a value does not fit.
     """
     source = _Source("encode(message)", type_name)
     general = source.name("general", _general_encoder(type_name))
@@ -115,7 +113,7 @@ def encoder(type_name: str) -> Encode:
 
 @functools.cache
 def decoder(type_name: str) -> Decode:
-    """The function that turns bytes into a message of the type; CdrError if they are none."""
+    """Return the function that decodes a message of the type; it raises CdrError if the bytes are not one."""
     source = _Source("decode(data)", type_name)
     fields = _fields(type_name)
     _add_entry(source, fields, "read_text")
@@ -130,9 +128,9 @@ def decoder(type_name: str) -> Decode:
 
 @functools.cache
 def head_reader(type_name: str, head: type[tuple[Any, ...]]) -> Decode:
-    """The function that reads the fields named by ``head``, a NamedTuple, from a message and none after the last.
+    """Return the function that reads the fields named by ``head``, a NamedTuple, and none after the last of them.
 
-    A text in a head is short and ASCII: a stranger may have sent it. Raises CdrError.
+    A text in a head must be short and ASCII: any program may have sent it. The function raises CdrError.
     """
     names: tuple[str, ...] = head._fields  # type: ignore[attr-defined]
     fields = _fields(type_name)
@@ -159,7 +157,7 @@ def _fields(type_name: str) -> tuple[Field, ...]:
 
 
 def _groups(fields: Sequence[Field]) -> Iterator[tuple[str, list[Field]]]:
-    """Consecutive fields that one step handles: ``numbers``, ``sequences`` of numbers; others one by one."""
+    """Yield consecutive fields that one step handles: ``numbers``, ``sequences`` of numbers; others one by one."""
 
     def group(item: tuple[int, Field]) -> tuple[str, int]:
         index, field = item
@@ -176,12 +174,12 @@ def _codes(fields: Sequence[Field]) -> str:
 
 
 def _variables(fields: Sequence[Field], prefix: str = "") -> str:
-    """The variables of fields, as a tuple; the underline keeps them apart from words of Python and helpers."""
+    """Return the variables of fields, as a tuple; the underscore avoids keywords of Python and names of helpers."""
     return "".join(f"{prefix}{field.name}_, " for field in fields).rstrip()
 
 
 def _arguments(fields: Sequence[Field], prefix: str = "") -> str:
-    """Numbers as arguments of a packing."""
+    """Return numbers as arguments of a packing."""
     return ", ".join(
         f"*divmod({prefix}{field.name}_, SECOND)" if field.kind == TIME else f"{prefix}{field.name}_"
         for field in fields
@@ -240,7 +238,7 @@ def _appender(type_name: str) -> _Append:
 
 
 class _WholePacking:
-    """The lines that pack a whole message at once, and ``rare`` where that cannot be."""
+    """The lines that pack a whole message at once, and the line ``rare`` where that is impossible."""
 
     def __init__(self, source: _Source, rare: str) -> None:
         self._source, self._rare = source, f"    {rare}"
@@ -249,11 +247,11 @@ class _WholePacking:
         self._arguments = ["HEADER"]
 
     def add_message(self, type_name: str, prefix: str, message: str) -> None:
-        """Add a message; its fields become variables that begin with ``prefix``."""
+        """Add a message; its fields become variables with the prefix ``prefix``."""
         fields = _fields(type_name)
         empty = _empty(type_name)
         if empty is not None and prefix:
-            # the one empty message stands in most messages of a recording
+            # most messages of a recording contain the one empty message
             self._source.add(*(f"{prefix}{field.name}_ = ()" for field in fields))
             self._source.add(*(f"{prefix}{members[0].name}_count = 0" for _, members in _groups(fields)))
             self._source.add(f"if {message} is not {self._source.name('empty', empty)}:")
@@ -304,7 +302,7 @@ class _WholePacking:
 
 @functools.cache
 def _smallest_size(type_name: str) -> int:
-    """Return the fewest bytes that a message of the type takes inside another."""
+    """Return the least number of bytes of a message of the type inside another."""
     total = 0
     for field in _fields(type_name):
         if field.array or field.kind == "string":
@@ -336,7 +334,7 @@ def _reader(type_name: str) -> _Read:
 
 
 def _add_entry(source: _Source, fields: Sequence[Field], text_reader: str) -> None:
-    """Add lines that check the header, read the fields and tell of bytes that are none."""
+    """Add lines that check the header, read the fields and raise CdrError for malformed bytes."""
     source.add(
         "if data[:4] != HEADER:",
         "    begins = f'starts with {data[:4].hex(chr(32))}, not with 00 01 00 00 (little-endian CDR)'",
@@ -351,7 +349,7 @@ def _add_entry(source: _Source, fields: Sequence[Field], text_reader: str) -> No
 
 
 def _add_reading(source: _Source, fields: Sequence[Field], text_reader: str) -> None:
-    """Add lines that put each field into its variable and move the position."""
+    """Add lines that store each field in its variable and advance the position."""
     for group, members in _groups(fields):
         field = members[0]
         target = f"{field.name}_, position"
@@ -410,7 +408,7 @@ Message = tuple[Any, ...]
 
 
 def encode(message: Message) -> bytes:
-    """Return the bytes of a message; its class tells the type.
+    """Return the bytes of a message; its class determines the type.
 
     Raises:
         CdrError: a value does not fit its field.
@@ -419,7 +417,7 @@ def encode(message: Message) -> bytes:
 
 
 def decode(type_name: str, data: bytes) -> Message:
-    """Return the message that the bytes hold.
+    """Return the message in the bytes.
 
     Raises:
         CdrError: they are not a message of this type.

@@ -1,8 +1,8 @@
-"""Decodes many CDR messages of one type at once: those of the same sizes are one matrix, and fields its columns.
+"""Decodes many CDR messages of one type at once: those of the same sizes form a matrix, with fields as its columns.
 
-Every bound that the scalar decoder of ``messages/cdr/cdr.py`` keeps is kept here. Whatever does not fit, has texts in a
-sequence, or has sizes that few messages share, is told as odd: the scalar decoder is to be asked about it, and its
-errors stand.
+The bounds are those of the scalar decoder in ``messages/cdr/cdr.py``. Messages that do not fit, have texts in a
+sequence, or sizes that few others share, are reported as odd: the scalar decoder must decode them, and its errors
+count.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 Array = NDArray[Any]
 
 FEWEST = 8
-"""Messages of the same sizes from which on a matrix is worth its making (decision: 100 us against 4 to 10 us each)."""
+"""Least number of messages of the same sizes that a matrix is made for (decision: 100 us against 4 to 10 us each)."""
 MOST_ITEMS = 64
 """Longest sequence of messages that is read as columns."""
 _COUNT = np.dtype("<u4")
@@ -36,8 +36,8 @@ _BYTE = np.dtype(np.uint8)
 class MessageColumns:
     """Messages of the same sizes: ``rows`` are their numbers, ascending.
 
-    ``fields`` has for each number or time (ns) a column, for a sequence a matrix with a row for each message, for a
-    text the matrix of its bytes. The fields of a message inside have its name and a dot in front.
+    ``fields`` has a column for each number or time (ns), a matrix with one row per message for a sequence, and the
+    matrix of its bytes for a text. The fields of a nested message have its name and a dot as prefix.
     """
 
     rows: Ints
@@ -46,7 +46,7 @@ class MessageColumns:
 
 @dataclass(frozen=True)
 class _Matrix:
-    """Messages of the same sizes as far as they are read: up to ``position``."""
+    """Messages of the same sizes, read up to ``position``."""
 
     rows: Ints
     bytes: Bytes
@@ -58,16 +58,16 @@ class _Matrix:
         return int(self.bytes.shape[1])
 
     def aligned(self, size: int) -> int:
-        """Return where a number of a size stands."""
+        """Return the position of the next number of a size."""
         return self.position + (len(HEADER) - self.position) % size
 
     def column(self, position: int, kind: np.dtype[Any], count: int = 1) -> Array | None:
-        """Return the numbers from a position on, None where the messages end before."""
+        """Return the numbers from a position on; None if the messages end before."""
         end = position + kind.itemsize * count
         return self.bytes[:, position:end].view(kind) if end <= self.length else None
 
     def then(self, position: int, name: str = "", field: Array | None = None) -> _Matrix:
-        """Return what is read up to a further position, with a further field."""
+        """Return the matrix read up to a later position, with one more field."""
         fields = self.fields if field is None else {**self.fields, name: field}
         return _Matrix(self.rows, self.bytes, position, fields)
 
@@ -77,7 +77,7 @@ class _Matrix:
         return _Matrix(self.rows[chosen], self.bytes[chosen], self.position, fields)
 
     def by_count(self) -> Iterator[tuple[int, _Matrix]]:
-        """Read the length of a text or sequence; messages of different lengths go on apart, few of one are left out."""
+        """Read the length of a text or sequence; yield a matrix for each length, but none for a length that is rare."""
         start = self.aligned(_COUNT.itemsize)
         counts = self.column(start, _COUNT)
         if counts is None:
@@ -98,7 +98,7 @@ _Read = Callable[[_Matrix], Iterator[_Matrix]]
 def decode_columns(type_name: str, data: Bytes, starts: Ints, lengths: Ints) -> tuple[list[MessageColumns], Ints]:
     """Decode messages of a type, which begin at ``starts`` of ``data`` and have ``lengths`` bytes.
 
-    Returns the columns of those that fit, and which messages are odd, ascending.
+    Returns the columns of those that fit, and the numbers of odd messages, ascending.
     """
     found: list[MessageColumns] = []
     odd = np.ones(len(starts), bool)
@@ -115,7 +115,7 @@ def decode_columns(type_name: str, data: Bytes, starts: Ints, lengths: Ints) -> 
 
 
 def _alike(keys: Array) -> Iterator[Ints]:
-    """Return which items have the same key, ascending."""
+    """Yield the numbers of the items with the same key, ascending."""
     order = np.argsort(keys, kind="stable")
     ordered = keys[order]
     yield from (part for part in np.split(order, np.flatnonzero(ordered[1:] != ordered[:-1]) + 1) if len(part))
@@ -138,7 +138,7 @@ def _read_all(matrix: _Matrix, readers: Sequence[_Read]) -> Iterator[_Matrix]:
 
 @functools.cache
 def _readers(type_name: str) -> tuple[_Read, ...]:
-    """Return what reads the fields of a type one after the other."""
+    """Return the functions that read the fields of a type one after the other."""
     return (_read_header, *_field_readers(type_name, ""))
 
 
@@ -163,7 +163,7 @@ def _readers_of(field: Field, name: str) -> Iterator[_Read]:
 
 @functools.cache
 def _members(type_name: str) -> tuple[tuple[str, str], ...]:
-    """Return names and codes of the fields of a message that stands in a sequence: all of them single numbers."""
+    """Return names and codes of the fields of a message in a sequence: all of them single numbers."""
     fields = message_types()[type_name].definition.fields
     if any(field.array or field.kind not in CODES for field in fields):
         raise TypeError(f"no columns for sequences of {type_name}")
@@ -226,7 +226,7 @@ def _read_items(name: str, members: tuple[tuple[str, str], ...], matrix: _Matrix
 
 
 def _items(name: str, members: tuple[tuple[str, str], ...], count: int, matrix: _Matrix) -> _Matrix | None:
-    """Read a sequence of messages; None where the bytes end before."""
+    """Read a sequence of messages; return None if the bytes end before."""
     columns: dict[str, list[Array]] = {member: [] for member, _ in members}
     for _ in range(count):
         for member, code in members:
@@ -243,7 +243,7 @@ def _items(name: str, members: tuple[tuple[str, str], ...], count: int, matrix: 
 
 
 def _fitting(matrix: _Matrix, fits: Array) -> Iterator[_Matrix]:
-    """Return those messages of a matrix that fit, if there are any."""
+    """Yield the matrix of those messages that fit, if there are any."""
     if fits.all():
         yield matrix
     elif fits.any():

@@ -1,7 +1,7 @@
-"""C text that finds the fields of a message type in its bytes: numbers by their values, the rest by place and count.
+"""Generates C code that finds the fields of a message type in its bytes: values of numbers, place and count of others.
 
-``cdr_fields.h`` has what the text is made of. Nothing is believed: a message whose fields do not lie within its bytes
-is told as one that does not fit, and so is whatever the scalar decoder alone can judge.
+``cdr_fields.h`` has the macros of the code. No length is trusted: a message whose fields do not lie within its bytes is
+reported as one that does not fit, and so is one that only the scalar decoder can check.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from automax_ros.messages.cdr.parts import CODES, size_of
 from automax_ros.messages.types.definitions import TIME, Field, message_types, short_name
 
 MACROS = (Path(__file__).parent / "cdr_fields.h").read_text(encoding="utf-8")
-"""What each text of this kind begins with, once."""
+"""The macros, which must precede the generated functions once."""
 _TYPES = {"?": "uint8_t", "B": "uint8_t", "b": "int8_t", "H": "uint16_t", "h": "int16_t", "I": "uint32_t"}
 _TYPES |= {"i": "int32_t", "Q": "uint64_t", "q": "int64_t"}
 
@@ -24,7 +24,7 @@ class FieldsSource:
     """A C function ``function`` that finds the fields of a type.
 
     ``numbers`` are the names of single numbers and times (ns), ``lists`` those of texts and sequences, in their order;
-    a message inside has its name and a dot before its fields.
+    fields of a nested message have its name and a dot as prefix.
     """
 
     function: str
@@ -76,7 +76,7 @@ def _list(field: Field) -> str:
 
 
 def _item_bytes(field: Field) -> str:
-    """Return what an item is aligned to, and its bytes."""
+    """Return the alignment of an item, and its size in bytes."""
     if field.kind == "string":
         return "1, 1"
     if field.kind in CODES:

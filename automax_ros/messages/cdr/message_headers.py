@@ -1,6 +1,6 @@
 """The first fields of a rack's messages, read from their CDR bytes without decoding the rest.
 
-A recorder of a live rack has to know where a message belongs, and stores its bytes as they came.
+A recorder of a live rack needs these fields to sort a message in, and stores its bytes unchanged.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from automax_ros.messages.types.messages import JointState, PlantState, Variable
 
 
 class WriteHead(NamedTuple):
-    """Where a CommonWrite or CommonImage stands: its stamp in ns, its run, its number in the write log."""
+    """The head of a CommonWrite or CommonImage: its stamp in ns, its run, its number in the write log."""
 
     stamp: int
     run_id: int
@@ -20,7 +20,7 @@ class WriteHead(NamedTuple):
 
 
 class ScanHead(NamedTuple):
-    """Where a Scan stands: its stamp in ns, its task, its number, and whether it holds all that was latched."""
+    """The head of a Scan: its stamp in ns, its task, its number, and whether it contains the whole latch."""
 
     stamp: int
     task: str
@@ -29,7 +29,7 @@ class ScanHead(NamedTuple):
 
 
 class StateHead(NamedTuple):
-    """Where a TaskState stands: its stamp in ns, its task, the number of the last scan that it contains."""
+    """The head of a TaskState: its stamp in ns, its task, the number of the last scan that it contains."""
 
     stamp: int
     task: str
@@ -37,7 +37,7 @@ class StateHead(NamedTuple):
 
 
 class OperationHead(NamedTuple):
-    """Where an Operation stands: its stamp in ns, its run."""
+    """The head of an Operation: its stamp in ns, its run."""
 
     stamp: int
     run_id: int
@@ -47,7 +47,7 @@ def table_of(payload: bytes) -> VariableTable:
     """Return a VariableTable.
 
     Raises:
-        CdrError: the bytes are none.
+        CdrError: the bytes are not one.
     """
     table = decode("automax_msgs/msg/VariableTable", payload)
     assert isinstance(table, VariableTable)
@@ -58,7 +58,7 @@ def plant_stamp(type_name: str, payload: bytes) -> int:
     """Return the stamp of a PlantState or of a JointState, ns.
 
     Raises:
-        CdrError: the bytes are none.
+        CdrError: the bytes are not one.
     """
     message = decode(type_name, payload)
     assert isinstance(message, PlantState | JointState)
@@ -69,7 +69,7 @@ def state_head(payload: bytes) -> StateHead:
     """Return the head of a TaskState.
 
     Raises:
-        CdrError: the bytes are none, or the task's name is not short ASCII text.
+        CdrError: the bytes are not one, or the task's name is not short ASCII text.
     """
     head: StateHead = head_reader("automax_msgs/msg/TaskState", StateHead)(payload)
     return head
@@ -79,7 +79,7 @@ def operation_head(payload: bytes) -> OperationHead:
     """Return the head of an Operation.
 
     Raises:
-        CdrError: the bytes are none.
+        CdrError: the bytes are not one.
     """
     head: OperationHead = head_reader("automax_msgs/msg/Operation", OperationHead)(payload)
     return head
@@ -89,7 +89,7 @@ def write_head(payload: bytes) -> WriteHead:
     """Return the head of a CommonWrite.
 
     Raises:
-        CdrError: the bytes are none.
+        CdrError: the bytes are not one.
     """
     head: WriteHead = head_reader("automax_msgs/msg/CommonWrite", WriteHead)(payload)
     return head
@@ -99,7 +99,7 @@ def image_head(payload: bytes) -> WriteHead:
     """Return the head of a CommonImage.
 
     Raises:
-        CdrError: the bytes are none.
+        CdrError: the bytes are not one.
     """
     head: WriteHead = head_reader("automax_msgs/msg/CommonImage", WriteHead)(payload)
     return head
@@ -109,7 +109,7 @@ def scan_head(payload: bytes) -> ScanHead:
     """Return the head of a Scan.
 
     Raises:
-        CdrError: the bytes are none, or the task's name is not short ASCII text.
+        CdrError: the bytes are not one, or the task's name is not short ASCII text.
     """
     head: ScanHead = head_reader("automax_msgs/msg/Scan", ScanHead)(payload)
     return head

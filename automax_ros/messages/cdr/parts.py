@@ -1,8 +1,8 @@
-"""What the generated codec of ``messages/cdr/cdr.py`` calls: layouts of numbers, texts and sequences in CDR.
+"""Helpers of the codec that ``messages/cdr/cdr.py`` generates: layouts of numbers, texts and sequences in CDR.
 
-Numbers stand at multiples of their size, counted from after the four bytes of the header. A sequence is its length
-(uint32) and its items; no padding follows the length of an empty one. A string is its length with the closing zero
-byte, its UTF-8 text and that byte.
+Numbers are aligned to multiples of their size, counted from the end of the header of four bytes. A sequence is its
+length (uint32) and its items; no padding follows the length of an empty one. A string is its length including the
+closing zero byte, its UTF-8 text and that byte.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 HEADER = b"\x00\x01\x00\x00"
-"""What a message starts with: classic CDR (XCDR1), little-endian."""
+"""The first bytes of a message: classic CDR (XCDR1), little-endian."""
 CODES = {
     "bool": "?",
     "byte": "B",
@@ -35,7 +35,7 @@ COUNTS = tuple(struct.Struct(f"<{-position % 4}xI") for position in range(4))
 MOST_TOGETHER = 64
 """Sequences with more items are read one by one: there the gain is small, and the layouts would be many."""
 MOST_LAYOUTS = 4096
-"""Most layouts of a message that are kept: a rack has few, a stranger could make many."""
+"""Most layouts of a message that are kept: a rack needs few, untrusted messages could need many."""
 MOST_HEAD_TEXT = 64
 """Longest text in a head, in bytes with its closing zero byte: a task's name has 8 characters (decision)."""
 
@@ -47,7 +47,7 @@ class CdrError(ValueError):
 
 
 def size_of(code: str) -> int:
-    """Return the bytes of a number, and so what it is aligned to."""
+    """Return the size of a number in bytes, which is also its alignment."""
     return struct.calcsize(f"<{code}")
 
 
@@ -72,7 +72,7 @@ class Layout:
         self._position += size
 
     def add_sequence(self, code: str, count: int) -> None:
-        """Add a sequence of this many numbers: its length and they are the arguments."""
+        """Add a sequence of this many numbers; the arguments are its length and the numbers."""
         self.add("I")
         if count:
             self.add(code, count)
@@ -94,10 +94,10 @@ def number_layouts(codes: str) -> tuple[struct.Struct, ...]:
 
 
 class WholePackings(dict[tuple[int, ...], Callable[..., bytes]]):
-    """How to pack a whole message at once, header included, by the sizes of its texts and sequences.
+    """Functions that pack a whole message at once, header included, by the sizes of its texts and sequences.
 
-    ``plan`` has a part for each size: ``text``, or the codes of sequences that have one length in common; and between
-    them the codes of single numbers.
+    ``plan`` has a part for each size: ``text``, or the codes of sequences that have the same length; and between them
+    the codes of single numbers.
     """
 
     def __init__(self, plan: Sequence[tuple[str, str]]) -> None:
@@ -123,7 +123,7 @@ class WholePackings(dict[tuple[int, ...], Callable[..., bytes]]):
 
 
 class SequencePackings(dict[tuple[int, ...], Callable[..., bytes]]):
-    """How to pack neighbouring sequences of numbers, by the position modulo 8 and the length of each."""
+    """Functions that pack neighbouring sequences of numbers, by the position modulo 8 and the length of each."""
 
     def __init__(self, codes: str) -> None:
         super().__init__()
@@ -163,7 +163,7 @@ def _too_long(count: int, rest: int) -> CdrError:
 
 
 def read_count(data: bytes, position: int, smallest: int) -> tuple[int, int]:
-    """Read the length of a sequence whose items take at least ``smallest`` bytes each; refuse what cannot be there."""
+    """Read the length of a sequence with items of at least ``smallest`` bytes each; refuse one that does not fit."""
     position += -position & 3
     (count,) = COUNT.unpack_from(data, position)
     position += 4
@@ -187,7 +187,7 @@ def read_text(data: bytes, position: int) -> tuple[str, int]:
 
 
 def read_head_text(data: bytes, position: int) -> tuple[str, int]:
-    """Read a string of the head of a message that a stranger may have sent: short, and ASCII."""
+    """Read a string in the head of a message that any program may have sent: short, and ASCII."""
     length, position = read_count(data, position, 0)
     if not 0 < length <= MOST_HEAD_TEXT:
         raise CdrError(f"a name of {length} bytes")
@@ -216,7 +216,7 @@ def read_numbers(data: bytes, position: int, code: str, size: int) -> tuple[tupl
 def read_items(
     data: bytes, position: int, read: Callable[[bytes, int], tuple[Any, int]], smallest: int
 ) -> tuple[tuple[Any, ...], int]:
-    """Read a sequence of messages; each takes at least ``smallest`` bytes."""
+    """Read a sequence of messages, each of at least ``smallest`` bytes."""
     count, position = read_count(data, position, smallest)
     items = []
     for _ in range(count):
@@ -226,10 +226,10 @@ def read_items(
 
 
 def together(codes: str) -> Together:
-    """Return what reads sequences of equal length in one step, as Values has them: most of the work with a recording.
+    """Return a function that reads sequences of equal length in one step, such as Values: most of a recording's work.
 
-    It returns the length, all numbers (each sequence after its length) and the position after them; length 0 where they
-    are empty, long, of different lengths or cut off: then they are to be read one by one.
+    It returns the length, all numbers (each sequence after its length) and the position after them; length 0 if they
+    are empty, long, of different lengths or cut off: then they must be read one by one.
     """
     layouts: dict[int, struct.Struct] = {}
 

@@ -1,1 +1,1 @@
-"""What a running rack sends, as messages and as their bytes."""
+"""The messages that a running rack sends, and their bytes."""

@@ -1,6 +1,6 @@
-"""The plants of a running rack as messages, at the rate at which the rack looks at them (``rack/plants/sampling``).
+"""The plants of a running rack as messages, at the rate at which the rack samples them (``rack/plants/sampling``).
 
-A plant is only metered (means, energies) where somebody takes its messages: that costs time, and changes nothing else.
+A plant is only metered (means, energies) if a sink takes its messages: metering costs time, and changes nothing else.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ NOT_METERED = Energies(nan, nan, nan, nan)
 
 
 class _Plant:
-    """One plant with its topics and what takes their messages."""
+    """One plant with its topics and the sinks of their messages."""
 
     def __init__(self, driven: DrivenPlant, plant: DrivePlant, space: str) -> None:
         self.driven, self.plant = driven, plant
@@ -37,29 +37,29 @@ class PlantStream:
     """Streams the plants of one rack to sinks. ``stamp`` returns the stamp of an instant of rack time."""
 
     def __init__(self, rack: Rack, space: str, stamp: Callable[[int], int]) -> None:
-        """Prepare the topics; nothing flows before ``begin``."""
+        """Prepare the topics; no message is sent before ``begin``."""
         self._rack, self._stamp = rack, stamp
         self._plants = [_Plant(driven, rack.plants[driven.name], space) for driven in rack.part.driven]
         self._encode_state, self._encode_joint = encoder(NAMES[PlantState]), encoder(NAMES[JointState])
 
     @property
     def topics(self) -> list[Topic]:
-        """All topics: two a plant."""
+        """All topics: two per plant."""
         return [topic for item in self._plants for topic in (item.state_topic, item.joint_topic)]
 
     def route(self, takes: Takes) -> None:
-        """Hand the messages of the topics that a sink takes to it."""
+        """Send a sink the messages of the topics that it takes."""
         for item in self._plants:
             for topic, routed in ((item.state_topic, item.states), (item.joint_topic, item.joints)):
                 if topic in takes:
                     routed.append(takes[topic])
 
     def last(self, plant: str) -> PlantState | None:
-        """Return the state of a plant that was sent last, None before the first, or where nobody takes it."""
+        """Return the last state of a plant that was sent; None before the first, or if no sink takes it."""
         return next((item.last for item in self._plants if item.driven.name == plant), None)
 
     def begin(self) -> None:
-        """Measure from now on what somebody takes."""
+        """Begin to meter and to send the plants whose messages a sink takes."""
         for item in self._plants:
             if item.states:
                 item.plant.begin_metering()
@@ -81,7 +81,7 @@ class PlantStream:
 
 
 def state_message(driven: DrivenPlant, plant: DrivePlant, stamp: int) -> PlantState:
-    """Return how a plant stands at its present; its means are those since it was asked last."""
+    """Return the state of a plant at its present time; its means are those since the last call."""
     signals = signals_of(plant)
     means = Means() if plant.meter is None else plant.meter.look()
     energies = signals.energies or NOT_METERED

@@ -1,4 +1,4 @@
-"""What happens in a rack as messages: variable table, images, write log, scans, states, values of commons."""
+"""The messages of a running rack: variable table, images, write log, scans, states, values of commons."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from automax_ros.runtime.tasks.task import Task
 
 Message = tuple[object, ...]
 SCALED_TYPE = NAMES[Float32]
-"""The ROS type of a variable with a scale: a number in the engineer's unit."""
+"""The ROS type of a variable with a scale: a number in the engineering unit."""
 _SCALARS: dict[DataType, Any] = {
     DataType.INTEGER: Int16,
     DataType.DOUBLE: Int32,
@@ -53,14 +53,14 @@ _SCALARS: dict[DataType, Any] = {
     DataType.BOOLEAN: Bool,
     DataType.STRING: String,
 }
-"""The classes of simple variables' topics: each takes the value."""
+"""The message classes of simple variables: each is created from the value."""
 _ARRAYS: dict[DataType, Any] = {
     DataType.INTEGER: Int16MultiArray,
     DataType.DOUBLE: Int32MultiArray,
     DataType.REAL: Float32MultiArray,
     DataType.BOOLEAN: UInt8MultiArray,
 }
-"""The classes of arrays' topics: each takes the layout and the values. std_msgs has none for strings."""
+"""The message classes of arrays: each is created from the layout and the values. std_msgs has none for strings."""
 
 
 def value_type_name(kind: DataType, *, is_array: bool) -> str | None:
@@ -77,7 +77,7 @@ def topic_type_name(variable: CommonVariable) -> str | None:
 
 
 def message_maker(variable: CommonVariable) -> Callable[[Any], Message]:
-    """Return what makes the message of a variable's topic: of its value, or of an array's values in order.
+    """Return the function that makes the message of a variable's topic from its value, or an array's values in order.
 
     An array's layout names its dimensions.
     """
@@ -86,15 +86,15 @@ def message_maker(variable: CommonVariable) -> Callable[[Any], Message]:
 
 
 def value_encoder(variable: CommonVariable) -> Callable[[Any], bytes]:
-    """Return what makes the bytes of the message of a variable's topic: of its value, or of an array's values in order.
+    """Return the function that makes the bytes of a variable's message from its value, or an array's values in order.
 
-    What it returns raises CdrError if the value does not fit.
+    The function raises CdrError if the value does not fit.
     """
     encode, make, scale = encoder(topic_type_name(variable) or ""), message_maker(variable), variable.scale
     if variable.is_array:
         return lambda values: encode(make(values))
     if scale is not None:
-        # A message of a simple variable has one field: a plain tuple is as good, and cheaper.
+        # A message of a simple variable has one field: a plain tuple works as well, and is cheaper.
         return lambda value: encode((scale.value_of(value) if isinstance(value, int) else value,))
     if variable.type is DataType.STRING:
         return lambda value: encode((value,))
@@ -125,12 +125,12 @@ def _layout(dimensions: tuple[int, ...]) -> MultiArrayLayout:
 class RackMessages:
     """Makes the messages of one run of a rack.
 
-    ``run_id`` is the number of the run; ``epoch_ns`` is added to rack time to give stamps: 0 in simulated time, the
-    wall clock at the start else.
+    ``run_id`` is the number of the run; ``epoch_ns`` is added to rack time to give stamps: 0 in simulated time, else
+    the wall clock at the start.
     """
 
     def __init__(self, rack: Rack, run_id: int) -> None:
-        """Begin with the numbering of the write log."""
+        """Create it, with the write log numbered from its beginning."""
         self._rack = rack
         self.run_id = run_id
         self.epoch_ns = 0
@@ -142,7 +142,7 @@ class RackMessages:
         self._tasks = {task: TaskMessages(task) for task in rack.tasks}
 
     def of(self, task: Task) -> TaskMessages:
-        """Return what makes the messages of a task: another one if it executes another program than before."""
+        """Return the object that makes the messages of a task: a new one once it executes another program."""
         known = self._tasks[task]
         if task.compiled is not known.compiled:
             self._tasks[task] = known = TaskMessages(task)
@@ -178,7 +178,7 @@ class RackMessages:
         return VariableTable(self.stamp(0), config.name, self.run_id, variables, writers)
 
     def image(self, now_ns: int) -> CommonImage:
-        """Return all of common memory as it is."""
+        """Return the present image of common memory."""
         values: list[Any] = []
         for view in range(len(self._rack.memory.specs)):
             present = self._rack.memory.present(view)
@@ -193,7 +193,7 @@ class RackMessages:
         return CommonImage(self.stamp(now_ns), self.run_id, self._write_log.sequence, image)
 
     def forces(self, now_ns: int) -> CommonWrite | None:
-        """Return what is forced as a further entry of the write log, None if nothing is: an image does not tell it."""
+        """Return the forced values as an entry of the write log; None if there are none: images do not show them."""
         memory = self._rack.memory
         if not memory.forced:
             return None
@@ -203,12 +203,12 @@ class RackMessages:
     def write_bytes(self, groups: Sequence[WriteGroup]) -> list[tuple[int, bytes]]:
         """Return stamp and bytes of the messages of a part of the write log.
 
-        Entries of one writer, kind and instant travel together.
+        Entries of one writer, kind and instant are in one message.
         """
         return self._write_log.packed(groups, self.epoch_ns, self.run_id)
 
     def operation(self, operation: Done) -> Operation:
-        """Return what was done to the rack."""
+        """Return the message of an operation on the rack."""
         return Operation(
             self.stamp(operation.at_ns),
             self.run_id,

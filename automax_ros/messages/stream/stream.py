@@ -1,7 +1,7 @@
 """The stream of a running rack: every topic's messages as CDR bytes, for the recorder and the nodes alike.
 
-The stream observes the rack and hands each message to its sinks, once encoded. Values of commons go out on change, not
-more often than a variable's rate limit allows; the last value before a pause always goes out.
+The stream observes the rack, encodes each message once and sends it to its sinks. Values of commons are sent on change,
+at most at a variable's rate limit; the last value before a pause is always sent.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ begin at each)."""
 
 
 class _ValueTopic:
-    """The topic of one variable, with what its rate limit needs."""
+    """The topic of one variable, with the data of its rate limit."""
 
     def __init__(self, variable: CommonVariable, topic: Topic) -> None:
         self.variable = variable
@@ -45,7 +45,7 @@ class _ValueTopic:
 
 
 class _TaskStream:
-    """What takes the scans of one task, its states, and of these a state after each scan."""
+    """The sinks of one task's scans, of its states, and of a state after each scan."""
 
     def __init__(self, messages: TaskMessages) -> None:
         self.messages = messages
@@ -62,7 +62,7 @@ class RackStream:
     """Observes a rack and streams it to sinks. ``run_id`` is that of ``RackMessages``."""
 
     def __init__(self, rack: Rack, run_id: int) -> None:
-        """Prepare the topics; nothing flows before ``begin``."""
+        """Prepare the topics; no message is sent before ``begin``."""
         space = f"/{rack.config.namespace}"
         self._rack = rack
         self.run_id = run_id
@@ -70,7 +70,7 @@ class RackStream:
         self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
         slots = [module.config.slot for module in rack.task_modules]
-        # Where common memory is in another process the first module with tasks says what is done here.
+        # If common memory is in another process, the first module with tasks sends the operations of this one.
         teller = None if rack.part.holds_common_memory else next(iter(slots), None)
         self.operations_topic = Topic(f"{space}/operations", "automax_msgs/msg/Operation", OPERATION, teller)
         self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
@@ -92,7 +92,7 @@ class RackStream:
 
     @property
     def has_begun(self) -> bool:
-        """Whether messages flow."""
+        """Whether messages are being sent."""
         return self._begun
 
     @property
@@ -106,7 +106,7 @@ class RackStream:
 
     @property
     def module_topics(self) -> list[Topic]:
-        """The topics that modules with tasks send on."""
+        """The topics of modules with tasks."""
         own = [*self.scans_topics.values(), *self.states_topics.values()]
         return own if self.operations_topic.slot is None else [*own, self.operations_topic]
 
@@ -116,9 +116,9 @@ class RackStream:
         return value.topic if value else None
 
     def add_sink(self, sink: Sink, *, tasks: Collection[str] | None = None, every_state: bool = False) -> Takes:
-        """Hand the messages of the topics that a sink takes to it; return what it takes.
+        """Send a sink the messages of the topics that it takes; return these topics with their functions.
 
-        With ``tasks`` it gets scans and states of these alone, with ``every_state`` a state after each of these scans.
+        With ``tasks`` it gets only scans and states of these, with ``every_state`` a state after each of these scans.
         """
         takes = {topic: take for topic in self.topics if (take := sink(topic)) is not None}
 
@@ -146,17 +146,17 @@ class RackStream:
         return self._messages.stamp(now_ns)
 
     def in_run(self, run_id: int) -> None:
-        """Be the stream of a run whose number was not known before; to be called before ``begin``."""
+        """Set the number of the run, if it was unknown at creation; to be called before ``begin``."""
         self.run_id = self._messages.run_id = run_id
 
     def leave_out(self, time_ns: int) -> None:
-        """Let later stamps be ahead by a time (ns) that the rack has not lived through."""
+        """Advance later stamps by a time (ns) that the rack skips."""
         self._messages.epoch_ns += time_ns
 
     def begin(self, epoch_ns: int = 0) -> None:
-        """Send the facts that stand at the start, and observe the rack: to be called just before ``Rack.start``.
+        """Send the state at the start, and observe the rack: to be called just before ``Rack.start``.
 
-        States of tasks are among them where they are not those of an installation: after a power-up.
+        It contains states of tasks that are not those of an installation, as after a power-up.
         ``epoch_ns`` is the wall clock at rack time 0; simulated time has none.
         """
         self._messages.epoch_ns = epoch_ns
@@ -173,12 +173,12 @@ class RackStream:
         self._begun = True
 
     def send_image(self) -> None:
-        """Send all of common memory as it is now, for somebody who joins a running rack."""
+        """Send the present image of common memory, for subscribers that join a running rack."""
         if self._begun:
             self._send_image(self._rack.now_ns)
 
     def send_states(self, slot: int) -> None:
-        """Send the states of a Processor's tasks, for somebody who joins; the next scan of each is a full one."""
+        """Send the states of a Processor's tasks, for late joiners; the next scan of each is a full one."""
         now = self._rack.now_ns
         for task, stream in self._tasks.items():
             if self._begun and task.slot == slot:
@@ -186,9 +186,9 @@ class RackStream:
                 stream.next_full_ns = now
 
     def repeat_facts(self, takes: Takes) -> None:
-        """Send one sink what stands now, between two scans: table, image, values of commons, states of its tasks.
+        """Send one sink the present state, between two scans: table, image, values of commons, states of its tasks.
 
-        The next scan of each task is a full one. So a recording can begin here, or a further file of one.
+        The next scan of each task is a full one. So a recording, or its next file, can begin here.
         """
         now = self._rack.now_ns
         own = set(takes.values())
@@ -203,7 +203,7 @@ class RackStream:
             self._send_state(task, now, own.intersection(stream.states))
 
     def end(self) -> None:
-        """Send what is held back by rate limits, what a scan under way has written so far, and the final states."""
+        """Send values held back by rate limits, what a scan in progress has written so far, and the final states."""
         now = self._rack.now_ns
         self._rack.observers.tell_writes()
         for view, value in self._values.items():
@@ -215,9 +215,9 @@ class RackStream:
     # RackObserver
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
-        """Send a scan, its writes and the values that changed; every now and then a snapshot after them."""
+        """Send a scan, its writes and the values that changed; at intervals also a snapshot after them."""
         stream = self._tasks[task]
-        now = max(record.time_ns, self._scheduler.now_ns)  # a modeled scan is told when it has ended
+        now = max(record.time_ns, self._scheduler.now_ns)  # a modeled scan is reported when it has ended
         full = now >= stream.next_full_ns and record.scan > 0
         own = 0 if not writes or writes[0].writer == task.writer else own_from(writes, task.writer)
         if own:
@@ -249,11 +249,11 @@ class RackStream:
         self._send_writes(writes, self._rack.now_ns)
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """Send the task's new state: no scan tells that a tunable was set."""
+        """Send the task's new state: no scan shows that a tunable was set."""
         self._send_state(task, now_ns)
 
     def operated(self, operation: Operation) -> None:
-        """Send an operation, and the states in which it has left the tasks that it concerns."""
+        """Send an operation, and the new states of the tasks that it concerns."""
         _send(self._messages.operation(operation), self._operations)
         for task in self._rack.tasks:
             if operation.ok and operation.concerns(task.name):
@@ -337,12 +337,12 @@ def _as_installed(task: Task) -> bool:
 
 
 def own_from(writes: Sequence[WriteGroup], writer: int) -> int:
-    """Return where a scan stands among writes: before its own first one, after all that others wrote before that."""
+    """Return the place of a scan among writes: before its own first one, after those of others before that."""
     return next((place for place, entry in enumerate(writes) if entry.writer == writer), len(writes))
 
 
 def _send(message: Message, takes: Collection[Take], stamp: int | None = None) -> None:
-    """Send a message that does not go out with every scan, at its own stamp unless another is given."""
+    """Send a message that is not sent with every scan, at its own stamp unless another is given."""
     payload = encode(message)
     for take in takes:
         take(message[0] if stamp is None else stamp, payload)

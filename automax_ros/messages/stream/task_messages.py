@@ -1,12 +1,10 @@
 """One task's scans and states as messages, and as their bytes without making the messages.
 
-A scan repeats name, slot and variables of its task for ever, so its bytes are those of a pattern with other numbers:
-that takes a fifth of the codec's time. What is seldom (texts, errors, full latches) goes through the codec.
+A scan always repeats name, slot and variables of its task, so its bytes are those of a pattern with other numbers:
+that takes a fifth of the codec's time. Rare content (texts, errors, full latches) is encoded by the codec.
 
-Unsigned numbers as the signed ones of the same bits, which is what is written into bytes one by one.
-
-Raises:
-    OverflowError: the number is negative, or has more bits.
+``as_i16``, ``as_i32`` and ``as_i64`` return an unsigned number as the signed one of the same bits, the form in which
+numbers are written into bytes one by one. They raise OverflowError if the number is negative, or has more bits.
 """
 
 from __future__ import annotations
@@ -38,7 +36,7 @@ from automax_ros.runtime.scan.scan_record import ScanRecord
 from automax_ros.runtime.tasks.task import Task
 
 _PLAIN: Final = (1 << 62) - 1
-"""Up to here a number is compared at once where this is compiled."""
+"""Up to this number a comparison takes one step in compiled code."""
 
 
 def as_i16(number: int) -> int:
@@ -63,7 +61,7 @@ def _wrapped(number: int, bits: int) -> int:
 
 
 _new = tuple.__new__
-"""Makes a message of a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
+"""Makes a message from a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
 _MOST: Final = 0xFFFFFFFF
 """The greatest uint32."""
 _HEAD = ("scan", "duration_ns", "skipped")
@@ -74,7 +72,7 @@ _ENTRIES = (
     ("written.variable",), ("written.element",), ("written.value",),
     ("committed.variable",), ("committed.value",),
 )  # fmt: skip
-"""What varies where only the numbers of entries recur."""
+"""The fields that vary if only the numbers of entries recur."""
 _Columns = tuple[tuple[int, ...], tuple[int, ...], tuple[Value, ...]]
 _NO_ENTRIES: _Columns = ((), (), ())
 
@@ -83,7 +81,7 @@ class TaskMessages:
     """Makes the messages of one task as it is installed. A stamp is in ns."""
 
     def __init__(self, task: Task) -> None:
-        """Take what every message of the task repeats."""
+        """Store what every message of the task repeats."""
         layout = task.layout
         self.compiled = task.compiled
         self._task = task
@@ -98,7 +96,7 @@ class TaskMessages:
         self._encode_scan, self._encode_state = encoder(NAMES[Scan]), encoder(NAMES[TaskState])
 
     def scan(self, record: ScanRecord, stamp: int, *, full: bool) -> Scan:
-        """Return the message of a scan; unless ``full``, only what was newly latched since the task's last message."""
+        """Return the message of a scan; unless ``full``, only with what has changed in the latch since the last one."""
         latched, before = record.latched, self._latched
         self._latched = latched if record.scan else None
         if full or before is None or not record.scan:
@@ -126,7 +124,7 @@ class TaskMessages:
         if quiet is None:
             message = self._scan(record, stamp, NO_VALUES, full=False)
             self._quiet = quiet = prepared(message, ("stamp",), _HEAD)
-        # What most scans come to: number by number, which is quicker than one packing where this is compiled.
+        # Most scans end here: they are written number by number, which is faster than one packing in compiled code.
         first, second, third = quiet.constants
         data = BytesWriter()
         try:
@@ -143,7 +141,7 @@ class TaskMessages:
         return data.getvalue()
 
     def state(self, stamp: int) -> TaskState:
-        """Return the message of the task's state as it is."""
+        """Return the message of the task's present state."""
         values = self._task.snapshot()
         marks = [HELD_MARK + name for name in sorted(self._task.compiled.held)]
         return TaskState(
@@ -179,7 +177,7 @@ class TaskMessages:
             raise CdrError(f"state of task {self._task.name}: {error}") from error
 
     def _in_pattern(self, record: ScanRecord, stamp: int, before: Latched) -> bytes:
-        """Return the bytes of a scan that has latched and committed what others have before it."""
+        """Return the bytes of a scan that has latched and committed the same variables as earlier ones."""
         latched, commits = record.latched, record.commits
         differs: tuple[bool, ...] = () if latched == before else tuple(map(ne, latched, before))
         views, values = zip(*commits, strict=True) if commits else ((), ())
@@ -209,7 +207,7 @@ class TaskMessages:
             raise CdrError(f"scan of task {self._task.name}: {error}") from error
 
     def _in_length(self, record: ScanRecord, stamp: int, before: Latched) -> bytes:
-        """Return the bytes of a scan that read or wrote apart from its latch: as many values as others before it."""
+        """Return the bytes of a scan that read or wrote actual memory: as many values as earlier ones."""
         latched = record.latched
         differs: tuple[bool, ...] = () if latched == before else tuple(map(ne, latched, before))
         changed_views, changed = tuple(compress(self._views, differs)), tuple(compress(latched, differs))
@@ -255,7 +253,7 @@ class TaskMessages:
                 constants[12],
             )
         except struct.error:
-            # A text, which stands elsewhere, or what does not fit: the codec tells.
+            # A text, which is stored elsewhere, or a value that does not fit: the codec decides.
             return self._encode_scan(self._scan(record, stamp, _changed(self._views, latched, differs), full=False))
 
     def _learnt(
@@ -267,14 +265,14 @@ class TaskMessages:
         stamp: int,
         differs: Sequence[bool],
     ) -> bytes:
-        """Return the bytes of a scan by the codec; if such scans recur, they are packed from now on."""
+        """Return the bytes of a scan by the codec; if such scans recur, prepare a pattern for them."""
         message = self._scan(record, stamp, _changed(self._views, record.latched, differs), full=False)
         if not (message.latched.text or message.read.text or message.written.text or message.committed.text):
             patterns.learn(key, lambda: prepared(message, ("stamp",), _HEAD, *groups))
         return self._encode_scan(message)
 
     def _scan(self, record: ScanRecord, stamp: int, changed: Values, *, full: bool) -> Scan:
-        """Return the message of a scan of which it is known what it tells of its latch."""
+        """Return the message of a scan; ``changed`` is its part about the latch."""
         committed = NO_VALUES
         if record.commits:
             variables, values = zip(*record.commits, strict=True)
@@ -297,7 +295,7 @@ class TaskMessages:
 
 
 def _fitting(number: int) -> int:
-    """Return a number as a uint32 holds it."""
+    """Return a number, limited to the greatest uint32."""
     return number if number <= _MOST else _MOST
 
 
@@ -310,7 +308,7 @@ def _columns(entries: Sequence[tuple[int, int, Value]]) -> _Columns:
 
 
 def _changed(views: Sequence[int], latched: Latched, differs: Sequence[bool]) -> Values:
-    """Return those latched values that differ from the ones before; none do where ``differs`` is empty."""
+    """Return the latched values that differ from the ones before; none if ``differs`` is empty."""
     if not differs:
         return NO_VALUES
     return as_values(tuple(compress(views, differs)), (0,) * sum(differs), tuple(compress(latched, differs)))

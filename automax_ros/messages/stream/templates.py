@@ -1,13 +1,11 @@
-"""Keeps what packs the messages that recur, by what they have in common.
-
-Preparing costs as much as thirty messages that go through the codec, so only what recurs is prepared (decision: after
-eight times), and no more than a rack that works can need.
-
-CDR of messages that are alike but for a few numbers: all else is packed once, a message then takes one packing.
+"""Templates for messages that differ only in a few numbers: all else is packed once, a message then takes one packing.
 
 A rack sends the same kinds of messages for ever: a task's scans with its name, slot and the same variables. Their bytes
-are those of ``messages/cdr/cdr.py``; only what can be prepared is (numbers, times, sequences of numbers), where else
-there is something the caller uses the codec itself.
+are those of ``messages/cdr/cdr.py``. Only numbers, times and sequences of numbers can vary; for other messages the
+caller uses the codec itself.
+
+Preparing a template costs as much as thirty messages in the codec, so only messages that recur get one (decision: after
+eight times), and only as many as a working rack can need.
 """
 
 from __future__ import annotations
@@ -24,13 +22,13 @@ from automax_ros.messages.types.messages import NAMES
 
 
 class MessageTemplate:
-    """What packs messages that are like one but for some fields.
+    """Packs messages that differ from one only in some fields.
 
-    ``pack`` takes the first of ``constants``, the numbers of the first group that varies, the second constant, those of
-    the second group, and so on to the last constant. A time counts as two numbers: seconds and nanoseconds.
+    The arguments of ``pack`` are the first of ``constants``, the numbers of the first group that varies, the second
+    constant, those of the second group, and so on to the last constant. A time is two numbers: seconds and nanoseconds.
     """
 
-    # Not a tuple with names: compiled code gets at the attributes of a class of its own at once.
+    # Not a NamedTuple: compiled code accesses the attributes of a native class directly.
     __slots__ = ("constants", "pack")
 
     def __init__(self, pack: Callable[..., bytes], constants: tuple[bytes, ...]) -> None:
@@ -39,7 +37,7 @@ class MessageTemplate:
 
 
 class _Builder:
-    """Cuts a message into constants and what varies."""
+    """Divides a message into constants and fields that vary."""
 
     def __init__(self, groups: Sequence[Sequence[str]]) -> None:
         self._group_of = {name: number for number, names in enumerate(groups) for name in names}
@@ -51,12 +49,12 @@ class _Builder:
         self._constants: list[bytes] = []
 
     def add_message(self, type_name: str, message: Message, prefix: str = "") -> None:
-        """Add a message, or one inside it, whose fields are told by ``prefix`` and name."""
+        """Add a message, or one inside it, whose fields are identified by ``prefix`` and name."""
         for field, value in zip(message_types()[type_name].definition.fields, message, strict=True):
             self._add_field(field, value, self._group_of.get(prefix + field.name, -1), f"{prefix}{field.name}.")
 
     def finish(self) -> MessageTemplate:
-        """Return the outcome."""
+        """Return the template."""
         self._cut()
         return MessageTemplate(struct.Struct(f"<{self._format}").pack, tuple(self._constants))
 
@@ -87,7 +85,7 @@ class _Builder:
         self._add("s", (data,))
 
     def _add(self, code: str, values: Sequence[Any], group: int = -1) -> None:
-        """Add values of one code with the padding before them; those of a group that varies only by their number."""
+        """Add values of one code with the padding before them; of a group that varies only their number counts."""
         if group >= 0 and group != self._group:
             if group != len(self._constants):
                 raise ValueError("the groups are not fields in order, each group together")
@@ -120,7 +118,7 @@ class _Builder:
             self._format += f"{padding}x"
 
     def _cut(self) -> None:
-        """End a constant: what varies follows, or nothing."""
+        """End a constant: fields that vary follow, or nothing."""
         constant = struct.pack(f"<{self._fixed}", *self._values)
         self._constants.append(constant)
         self._format += f"{len(constant)}s"
@@ -128,12 +126,12 @@ class _Builder:
 
 
 def prepared(message: Message, *groups: Sequence[str]) -> MessageTemplate:
-    """Return what packs messages that are like one but for the numbers in some fields.
+    """Return the template of messages that differ from one only in the numbers of some fields.
 
     Args:
-        message: one of them; its class tells the type. Sequences keep their length.
-        groups: names of the fields that vary, of messages inside as ``latched.value``, in order; the fields of a group
-            follow each other.
+        message: one of them; its class determines the type. Sequences keep their length.
+        groups: names of the fields that vary, in order, those of nested messages as ``latched.value``; the fields of a
+            group follow each other.
 
     Raises:
         struct.error: a value does not fit its field.
@@ -149,16 +147,16 @@ def prepared(message: Message, *groups: Sequence[str]) -> MessageTemplate:
 
 
 ENOUGH_TIMES = 8
-"""How often the codec packs messages of one pattern before one is prepared for them."""
+"""How often the codec packs messages of one pattern before a template is prepared for them."""
 MOST_PATTERNS = 2048
-"""Most patterns that are known at a time: an array's elements in turn would make ever more."""
+"""Most patterns that are known at a time: an array's elements in turn would make more and more."""
 
 
 class TemplateCache:
     """The patterns of one kind of message. ``known`` has those that are prepared, by key."""
 
     def __init__(self) -> None:
-        """Know none."""
+        """Create it without patterns."""
         self.known: dict[Hashable, MessageTemplate] = {}
         self._seen: dict[Hashable, int] = {}
 

@@ -23,7 +23,7 @@ class WriteMessages:
     """
 
     def __init__(self, slots: Mapping[int, int]) -> None:
-        """Begin with the numbering."""
+        """Create it, with the numbering at its beginning."""
         self.sequence = 0
         self._slots = slots
         self._patterns = TemplateCache()
@@ -38,7 +38,7 @@ class WriteMessages:
         return CommonWrite(stamp, run_id, writer, self._slots[writer], int(kind), self.sequence, values)
 
     def packed(self, groups: Sequence[WriteGroup], epoch_ns: int, run_id: int) -> list[tuple[int, bytes]]:
-        """Return stamp and bytes of what tells of a part of the write log: neighbours of one key travel together.
+        """Return stamp and bytes of the messages of a part of the write log; neighbours of one key are in one message.
 
         ``epoch_ns`` is added to rack time to give stamps.
 
@@ -74,9 +74,9 @@ class WriteMessages:
             raise CdrError(f"a write to common memory: {error}") from error
 
     def _several(self, groups: Sequence[WriteGroup], stamp: int, run_id: int) -> bytes:
-        """Return the bytes of several groups of one key: those of a pattern by how many values there are.
+        """Return the bytes of several groups of one key, by the pattern for their number of values.
 
-        Which values they are varies too: a drive's loop writes another record of DIAG_DATA at each scan.
+        The variables vary, too: a drive's loop writes another record of DIAG_DATA at each scan.
         """
         views: list[int] = []
         elements: list[int] = []
@@ -108,7 +108,7 @@ class WriteMessages:
                     constants[5],
                 )
             except struct.error:
-                pattern = None  # a text, or what does not fit: the codec tells
+                pattern = None  # a text, or a value that does not fit: the codec decides
             else:
                 self.sequence = number
                 return payload
@@ -120,7 +120,7 @@ class WriteMessages:
 
 
 def _neighbours(groups: Sequence[WriteGroup]) -> Iterator[Sequence[WriteGroup]]:
-    """Yield the parts of which each group has the same time, writer and kind."""
+    """Yield the parts whose groups have the same time, writer and kind."""
     begin, first = 0, groups[0]
     for place, group in enumerate(groups):
         if group.time_ns != first.time_ns or group.writer != first.writer or group.kind is not first.kind:

@@ -1,4 +1,4 @@
-"""Definitions of message types: those that recordings hold, and those that a bag brings along in its schemas.
+"""Definitions of message types: those of our recordings, and those in the schemas of a bag.
 
 ``message_types.json`` holds the .msg texts and RIHS01 hashes; ``tools/generate_message_types.py`` writes it.
 """
@@ -60,8 +60,8 @@ class Constant:
 class Field:
     """One field: ``kind`` is a primitive or the full name of a type.
 
-    ``array`` is empty for a single value, else as it stands in the text: ``[]``, ``[3]`` or ``[<=3]``; ``bound`` is the
-    longest text of a bounded string, else None.
+    ``array`` is empty for a single value, else as in the text: ``[]``, ``[3]`` or ``[<=3]``; ``bound`` is the greatest
+    length of a bounded string, else None.
     """
 
     name: str
@@ -81,7 +81,7 @@ class Definition:
 
 @dataclass(frozen=True)
 class MessageType:
-    """A type that recordings hold: its .msg text, RIHS01 hash and parsed definition."""
+    """A type of our recordings: its .msg text, RIHS01 hash and parsed definition."""
 
     name: str
     text: str
@@ -167,7 +167,7 @@ def parse_schema(name: str, text: str) -> dict[str, Definition]:
 
 @functools.cache
 def message_types() -> dict[str, MessageType]:
-    """Every type that recordings hold, by full name."""
+    """Return every type of our recordings, by full name."""
     table = json.loads(Path(__file__).with_name("message_types.json").read_text(encoding="utf-8"))
     return {
         name: MessageType(name, entry["text"], entry["hash"], parse_definition(name, entry["text"]))
@@ -176,7 +176,7 @@ def message_types() -> dict[str, MessageType]:
 
 
 def dependencies(name: str) -> list[str]:
-    """The full names of the types that a type of :func:`message_types` uses, directly or not, in order of first use."""
+    """Return the full names of the types that a known type uses, directly or not, in order of first use."""
     found: list[str] = []
     for field in message_types()[name].definition.fields:
         if field.kind not in PRIMITIVES:
@@ -186,14 +186,14 @@ def dependencies(name: str) -> list[str]:
 
 @functools.cache
 def schema_text(name: str) -> str:
-    """The complete ``ros2msg`` schema of a type: its text, then that of each type it uses."""
+    """Return the complete ``ros2msg`` schema of a type: its text, then that of each type it uses."""
     parts = [message_types()[name].text]
     parts += [f"{SEPARATOR}\nMSG: {short_name(item)}\n{message_types()[item].text}" for item in dependencies(name)]
     return "\n".join(parts)
 
 
 def same_layout(name: str, schema: dict[str, Definition]) -> bool:
-    """Whether a bag's schema of ``name`` has the fields of the type that we know, nested types included."""
+    """Return whether a bag's schema of ``name`` has the fields of the known type, nested types included."""
     return all(
         item in schema and schema[item].fields == message_types()[item].definition.fields
         for item in (name, *dependencies(name))

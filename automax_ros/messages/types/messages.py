@@ -1,17 +1,10 @@
-"""The messages of a recording as Python tuples with names: one class a type, fields as in its .msg file.
+"""The messages of a rack as Python tuples with names: one class per type, fields as in its .msg file.
 
-A time (``builtin_interfaces/Time``) is an integer of nanoseconds. Sequences may be given as list, tuple or array;
-read from a bag they are tuples.
+They are the messages of a recording and, which no recording contains, the table of a rack's tasks and the messages
+between the processes of one rack.
 
-Values of common variables as messages carry them.
-
-The table of a rack's tasks, as Python tuples with names: no recording holds it.
-
-A time (``builtin_interfaces/Time``) is an integer of nanoseconds.
-
-The messages between the processes of one rack, as Python tuples with names: no recording holds them.
-
-A time (``builtin_interfaces/Time``) is an integer of nanoseconds.
+A time (``builtin_interfaces/Time``) is an integer of nanoseconds. Sequences may be given as list, tuple or array; in a
+message read from a bag they are tuples.
 """
 
 from __future__ import annotations
@@ -34,9 +27,9 @@ class Values(NamedTuple):
 
 
 NO_VALUES = Values()
-"""The one empty Values: most messages of a recording hold it, and the codec knows it by its identity."""
+"""The one empty Values: most messages of a recording contain it, and the codec recognises it by its identity."""
 _new = tuple.__new__
-"""Makes a message of a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
+"""Makes a message from a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
 
 
 def values_of(entries: Sequence[tuple[int, int, Value]]) -> Values:
@@ -56,7 +49,7 @@ def as_values(variables: Sequence[int], elements: Sequence[int], values: Sequenc
 
 
 class TaskInfo(NamedTuple):
-    """One task as it stands."""
+    """The present state of one task."""
 
     task: str
     module: str
@@ -82,7 +75,7 @@ class TaskTable(NamedTuple):
 
 
 class Stage(enum.IntEnum):
-    """How far a process is: ``Presence.state``."""
+    """The stage of a process: ``Presence.state``."""
 
     JOINING = 0
     READY = 1
@@ -104,7 +97,7 @@ class BusWrite(NamedTuple):
 
 
 class BusImage(NamedTuple):
-    """What one process holds of common memory, for one that joins or that has missed a message."""
+    """The image of common memory in one process, for one that joins or that has missed a message."""
 
     stamp: int
     run_id: int
@@ -126,7 +119,7 @@ class BusImage(NamedTuple):
 
 
 class Presence(NamedTuple):
-    """A process says that it lives, how far it is, and how the rack stands as it knows it."""
+    """The presence of a process: its stage, and the rack's operating state as it knows it."""
 
     stamp: int
     rack: str
@@ -178,7 +171,7 @@ class ScanError(NamedTuple):
 
 
 class Scan(NamedTuple):
-    """One scan of one task: all that is needed to execute it again and to compare."""
+    """One scan of one task: all data needed to execute it again and to compare."""
 
     stamp: int
     slot: int
@@ -195,7 +188,7 @@ class Scan(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """Something that was done to a rack, or asked for and refused (not ``ok``)."""
+    """An operation on a rack, or one that was requested and refused (not ``ok``)."""
 
     stamp: int
     run_id: int
@@ -238,7 +231,7 @@ class Variable(NamedTuple):
 
 
 class Writer(NamedTuple):
-    """Who may write common memory."""
+    """A writer of common memory."""
 
     id: int
     name: str
@@ -257,7 +250,7 @@ class VariableTable(NamedTuple):
 
 
 class PlantState(NamedTuple):
-    """What the plant of a drive did since the message before, and how it stands."""
+    """The means of a drive's plant since the message before, and its present state."""
 
     stamp: int
     plant: str
@@ -284,7 +277,7 @@ class PlantState(NamedTuple):
 
 
 class NetworkDrop(NamedTuple):
-    """What a module sends of one drop of a network of racks: 32 registers."""
+    """The message of a module for one drop of a network of racks: 32 registers."""
 
     stamp: int
     run_id: int
@@ -411,7 +404,7 @@ class UInt8MultiArray(NamedTuple):
 
 
 HELD_MARK = "forced "
-"""Begins the fields without values that stand first in a TaskState: the names of the locals that a force holds."""
+"""Prefix of the fields without values that come first in a TaskState: the names of the locals that a force holds."""
 _OWN = (
     BusImage,
     BusWrite,

@@ -1,7 +1,7 @@
 """The files that a rack runs from, its YAML file and the sources of its tasks, as one text for the topic ``config``.
 
 The text is JSON, which is YAML too: ``{"rack": "PM1", "files": [{"name": "rack.yaml", "sha256": "...", "text": "..."},
-...]}``. Who records a running rack stores these files in the bag, as the rack's own recorder does.
+...]}``. A recorder of a running rack stores these files in the bag, as the rack's own recorder does.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # what reads a recording needs no rack, which takes a second to load
+if TYPE_CHECKING:  # reading a recording needs no rack, which takes a second to load
     from automax_ros.rack.rack import Rack
 
 RACK_FILE = "rack.yaml"
@@ -37,7 +37,7 @@ class RackFile:
 
     @property
     def sha256(self) -> str:
-        """The hash of the text, as TaskState.source_hash has it of a task's source."""
+        """The hash of the text; for a task's source that of TaskState.source_hash."""
         return hashlib.sha256(self.text.encode("utf-8", "surrogatepass")).hexdigest()
 
     @property
@@ -47,7 +47,7 @@ class RackFile:
 
     @property
     def media_type(self) -> str:
-        """What the file is."""
+        """The media type of the file."""
         return "application/yaml" if self.name == RACK_FILE else "text/plain"
 
     @property
@@ -65,7 +65,7 @@ def files_of(rack: Rack) -> list[RackFile]:
 
 
 def source_name(task: str, file: str) -> str:
-    """Return what the source of a task is stored as: its suffix tells a BASIC task from a control-block task."""
+    """Return the name under which a task's source is stored: its suffix is that of a BASIC or a control-block task."""
     return f"{task}.BAS" if file.upper().endswith(".BAS") else f"{task}.BLK"
 
 

@@ -1,7 +1,4 @@
-"""Topics of a stream, and what takes their messages.
-
-Quality of service of the topics in a recording, as data.
-"""
+"""Topics of a stream, their quality of service as data, and the sinks of their messages."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}
-"""How ROS 2 writes a duration without end."""
+"""The infinite duration, as ROS 2 writes it."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,7 @@ class QosProfile:
     depth: int
 
     def as_yaml_data(self) -> dict[str, object]:
-        """The profile as ``offered_qos_profiles`` of bag metadata lists it (version 9: policies by name)."""
+        """Return the profile as in ``offered_qos_profiles`` of bag metadata (version 9: policies by name)."""
         return {
             "history": self.history,
             "depth": self.depth,
@@ -37,25 +34,25 @@ class QosProfile:
 
 
 LATCHED = QosProfile("reliable", "transient_local", "keep_last", 1)
-"""The last message waits for late joiners."""
+"""The last message is kept for late joiners."""
 VALUE = LATCHED
 """The value of a common variable."""
 OPERATION = QosProfile("reliable", "transient_local", "keep_last", 100)
-"""What was done last waits for late joiners, oldest first (decision: 100 operations)."""
+"""The last operations are kept for late joiners, oldest first (decision: 100 operations)."""
 SCAN = QosProfile("reliable", "volatile", "keep_last", 1000)
 """A stream of which every message counts."""
 NETWORK = QosProfile("best_effort", "volatile", "keep_last", 256)
-"""What comes again in 5.5 ms: one that is lost is not sent again, nobody waits for a slow reader (decision)."""
+"""Messages that are repeated after 5.5 ms: a lost one is not sent again, a slow reader is not waited for (decision)."""
 PLANT = QosProfile("reliable", "volatile", "keep_last", 100)
 """A second of a plant's samples (decision)."""
 
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of the stream: full name, ROS type, quality of service; ``slot`` of the module that sends on it.
+    """A topic of the stream: full name, ROS type, quality of service; ``slot`` of the module that publishes on it.
 
-    Several modules send on one topic: each has a Topic of its own. ``slot`` None is the common memory. ``plant`` is the
-    plant whose node sends, "" where it is the module's own.
+    If several modules publish on one topic, each has its own Topic. ``slot`` None is the common memory. ``plant`` is
+    the plant whose node publishes, "" if it is the module's own.
     """
 
     name: str
@@ -66,8 +63,8 @@ class Topic:
 
 
 Take = Callable[[int, bytes], None]
-"""Takes a message of one topic: its stamp in ns, its CDR bytes."""
+"""Receives a message of one topic: its stamp in ns, its CDR bytes."""
 Sink = Callable[[Topic], Take | None]
-"""Asked once for each topic: what takes its messages, None where nothing does."""
+"""Called once for each topic; returns the function that receives its messages, None if there is none."""
 Takes = dict[Topic, Take]
-"""What a sink takes."""
+"""The topics that a sink takes, with the functions that receive their messages."""

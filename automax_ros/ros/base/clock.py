@@ -1,10 +1,10 @@
-"""A rack's time and ``/clock``: which of its paces a rack has, told to others or heard from them.
+"""The time of a rack and ``/clock``: which pacer a rack has, and whether it publishes or follows ``/clock``.
 
-- On the wall clock ``/clock`` is nobody's business.
-- Simulated (``automax run --simulated --ros``) the rack sends ``/clock`` after all messages of the instant.
-- With ``use_sim_time`` the rack follows another's ``/clock``: it begins with the first message, and each further one
-  lets all happen that happens up to it (``FollowingPacer``). Writes that have come before a message of the clock are
-  taken before it (``Door``).
+- On the wall clock, ``/clock`` is neither published nor read.
+- Simulated (``automax run --simulated --ros``), the rack publishes ``/clock`` after all messages of the instant.
+- With ``use_sim_time`` the rack follows the ``/clock`` of another node: it starts with the first message, and each
+  further one executes everything up to its time (``FollowingPacer``). Writes received before a message of the clock
+  are processed before it (``MessageIntake``).
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ CLOCK = "/clock"
 _TYPE = "rosgraph_msgs/msg/Clock"
 _TOLD = QosProfile("reliable", "volatile", "keep_last", 10)
 _HEARD = QosProfile("best_effort", "volatile", "keep_last", 1000)
-"""Publishers of ``/clock`` may be of either kind; this many wait while the rack is busy."""
+"""Matches reliable and best-effort publishers of ``/clock``; its depth is what waits while the rack is busy."""
 _MOST_BYTES = 64
 _LATEST_NS = ((1 << 31) - 366 * 24 * 3600) * NS_PER_S
-"""The stamps of ROS end in 2038: a clock that leaves a rack less than a year until then is refused (decision)."""
+"""The time stamps of ROS end in 2038: a clock with less than a year left until then is refused (decision)."""
 _WAIT_S = 0.05
 _LOOK_INTERVAL_S = 1.0
-"""Time between two looks for other publishers of ``/clock``."""
+"""Seconds between two checks for other publishers of ``/clock``."""
 JUMP = "clock jump"
 TAKEN = "other /clock"
 MALFORMED = "malformed /clock"
-"""What ``Health`` counts."""
+"""Names under which ``Health`` counts these problems."""
 
 
 class RackClock:
-    """Makes the pace of one rack, and joins it with ``/clock``."""
+    """Creates the pacer of one rack and connects it to ``/clock``."""
 
     def __init__(
         self, scheduler: Scheduler, turns: RackLock, *, follows: bool, simulated: SimulatedTime | None
     ) -> None:
-        """Make the pace; simulated time is the rack's own, even where all nodes are to follow ``/clock``."""
+        """Create the pacer; a simulated rack does not follow ``/clock``, even if all nodes are to."""
         self._site: RackContext | None = None
         self._node: ModuleNode | None = None
         self._topic = CLOCK
@@ -69,11 +69,11 @@ class RackClock:
 
     @property
     def is_there(self) -> bool:
-        """Whether the rack can begin: where it follows a clock, that has been heard."""
+        """Whether the rack can start: if it follows ``/clock``, after its first message."""
         return self._follower is None or self._follower.has_clock
 
     def join(self, site: RackContext, node: ModuleNode) -> None:
-        """Send or hear ``/clock`` by a node of the rack."""
+        """Publish ``/clock`` or subscribe to it, by a node of the rack."""
         self._site, self._node = site, node
         if isinstance(self.pace, SimulatedPacer):
             publisher = node.create_publisher(message_class(_TYPE), CLOCK, ros_qos(_TOLD))
@@ -84,7 +84,7 @@ class RackClock:
             site.door.add(_ClockWay(subscription, self._hear), last=True)
 
     def wait(self, should_stop: Callable[[], bool], on_idle: Callable[[int], None] | None = None) -> bool:
-        """Wait until the rack can begin; FALSE where asked to stop. ``on_idle`` gets rack time meanwhile, 0."""
+        """Wait until the rack can start; return False if asked to stop. ``on_idle`` gets rack time meanwhile, 0."""
         while not self.is_there:
             if on_idle is not None:
                 on_idle(self.pace.now_ns)
@@ -113,10 +113,10 @@ class RackClock:
         self._look_around(own=0)
 
     def _follow(self, clock_ns: int) -> None:
-        """Take a time of the clock.
+        """Follow ``/clock`` to a time.
 
         Raises:
-            CdrError: stamps, which are ahead of a clock that went back, would come to the end of what ROS can tell.
+            CdrError: time stamps, which are ahead of a clock that went back, would exceed the range of ROS.
         """
         assert self._site is not None
         assert self._follower is not None
@@ -127,7 +127,7 @@ class RackClock:
             self._follower.heard(clock_ns)
 
     def _look_around(self, own: int) -> None:
-        """Warn where more than one node sends ``/clock``."""
+        """Warn if more than one node publishes ``/clock``."""
         assert self._node is not None
         assert self._site is not None
         if self._throttle.passes() and self._node.count_publishers(self._topic) > 1:
@@ -150,7 +150,7 @@ class RackClock:
 
 
 class _ClockWay:
-    """The subscription of ``/clock``, as the door serves it."""
+    """The subscription to ``/clock``, as ``MessageIntake`` reads it."""
 
     def __init__(self, subscription: Any, hear: Callable[[bytes | None], None]) -> None:
         self.name, self.handle = subscription.topic_name, subscription.handle
@@ -164,11 +164,11 @@ class _ClockWay:
         return taken is not None
 
     def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Let rcl call a function for each message."""
+        """Set the C function that rcl calls for each message."""
         rcl = library()
         assert rcl is not None
         return int(rcl.on_message(pointer, callback, data))
 
 
 def _unsent(_: bytes) -> None:
-    """Send nothing: the rack has no node yet."""
+    """Publish nothing: the rack has no node yet."""

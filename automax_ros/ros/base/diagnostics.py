@@ -1,9 +1,10 @@
 """``/diagnostics`` of one process: one message with the health of the rack, its modules, tasks and plants.
 
-It is sent once per second of rack time, and at once when a level has changed, five times per second at most (decision).
-While the rack is halted it goes by the wall clock, so that nobody takes a halted rack for a dead one. A status is named
-``RACK/NODE: PART``, ``pm1/processor_1: LINE``, in the form that diagnostic_aggregator groups; its ``hardware_id`` is
-``PM1 slot 1``. Levels are those of REP-107; STALE is never sent: it is the reader's word for what does not come.
+It is published once per second of rack time, and immediately when a level changes, at most five times per second
+(decision). While the rack is halted the wall clock counts, so that a halted rack does not look like a dead one. A
+status is named ``RACK/NODE: PART``, such as ``pm1/processor_1: LINE``, as diagnostic_aggregator groups them; its
+``hardware_id`` is ``PM1 slot 1``. Levels are those of REP-107; STALE is never published: readers set it when statuses
+stop arriving.
 """
 
 from __future__ import annotations
@@ -26,23 +27,23 @@ from automax_ros.runtime.tasks.task import ScanRecord, Task
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
 
 PERIOD_NS = NS_PER_S
-"""How often all statuses are sent, rack time."""
+"""Period at which all statuses are published, rack time."""
 SHORTEST_NS = 200 * NS_PER_MS
-"""Least time from one message to a look at the levels ..."""
+"""Shortest time from a message to the next check of the levels, rack time."""
 LOOK_NS = 50 * NS_PER_MS
-"""... and from one look to the next, rack time."""
+"""Shortest time between two checks of the levels, rack time."""
 TOPIC = "/diagnostics"
 _DEPTH = 10
 _KEY = EventKey(EventClass.OBSERVE, 0, "diagnostics")
 Source = Callable[[int], list[DiagnosticStatus]]
-"""Returns statuses at a rack time (ns)."""
+"""Returns the statuses at a rack time (ns)."""
 
 
 class Diagnostics:
-    """Sends what sources tell. ``begin`` once, with the node that publishes."""
+    """Publishes the statuses of its sources. Call ``begin`` once, with the node that publishes."""
 
     def __init__(self) -> None:
-        """Begin without sources."""
+        """Create it without sources."""
         self._sources: list[Source] = []
         self._levels: dict[str, bytes] = {}
         self._counts: dict[str, int] = {}
@@ -55,11 +56,11 @@ class Diagnostics:
 
     @property
     def begun(self) -> bool:
-        """Whether somebody publishes."""
+        """Whether ``begin`` was called."""
         return self._publisher is not None
 
     def begin(self, rack: Rack, stream: RackStream, pace: object, node: Node) -> None:
-        """Publish from now on, by a node's publisher; observe the rack and what keeps its pace."""
+        """Publish from now on, by a publisher of a node; observe the rack and its pacer."""
         self._rack, self._stream, self._pace = rack, stream, pace
         self._publisher = node.create_publisher(DiagnosticArray, TOPIC, _DEPTH)
         rack.scheduler.every(PERIOD_NS, rack.now_ns, _KEY, lambda now, _: self._report(now))
@@ -68,16 +69,16 @@ class Diagnostics:
             pace.while_halted = self._while_halted
 
     def add(self, source: Source) -> None:
-        """Send what a source tells, too, after the others'."""
+        """Add a source; its statuses follow those of earlier sources."""
         self._sources.append(source)
 
     def newly(self, what: str, count: int) -> int:
-        """Return by how much a count has risen since the last report of a second; ``what`` tells counts apart."""
+        """Return by how much a count has risen since the last periodic report; ``what`` identifies the count."""
         self._counts[what] = count
         return count - self._sent_counts.get(what, 0)
 
     def look(self) -> None:
-        """Send at the next opportunity if a level has changed."""
+        """Publish at the next opportunity if a level has changed."""
         self._changed = True
         if self._pending is None and not is_halted(self._pace):
             at_ns = max(self._rack.now_ns, self._next_look_ns)
@@ -86,18 +87,18 @@ class Diagnostics:
     # RackObserver
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
-        """Look where a scan had errors or came late."""
+        """Check the levels if a scan had errors or others were skipped."""
         if record.errors or record.skipped:
             self.look()
 
     def written(self, writes: list[WriteGroup]) -> None:
-        """Writes from outside change the health of nothing."""
+        """Ignore writes from outside: they change no status."""
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """A tunable that is set changes the health of nothing."""
+        """Ignore tuning: it changes no status."""
 
     def operated(self, operation: Operation) -> None:  # noqa: ARG002
-        """Look after whatever was done."""
+        """Check the levels after each operation."""
         self.look()
 
     def _report(self, now_ns: int) -> None:
@@ -109,7 +110,7 @@ class Diagnostics:
         self._next_look_ns = now_ns + (SHORTEST_NS if self._look(now_ns) else LOOK_NS)
 
     def _look(self, now_ns: int) -> bool:
-        """Send if a level has changed, and say so."""
+        """Publish if a level has changed, and return whether it has."""
         self._changed = False
         statuses = self._statuses(now_ns)
         if {item.name: item.level for item in statuses} == self._levels:
@@ -148,6 +149,6 @@ def status_of(name: str, hardware: str, level: bytes, text: str, values: Mapping
 
 
 def worst(statuses: list[DiagnosticStatus]) -> bytes:
-    """Return the worst level of statuses, OK without any."""
+    """Return the worst level of statuses; OK if there are none."""
     levels: list[bytes] = [item.level for item in statuses]
     return max(levels, default=bytes(DiagnosticStatus.OK))

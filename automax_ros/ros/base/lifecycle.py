@@ -1,8 +1,8 @@
-"""Managed nodes: the states and transitions that ROS 2 lifecycle managers know, over what a rack can do.
+"""Managed nodes: the states and transitions of ROS 2 lifecycle managers, applied to a rack.
 
-A transition is asked of the services that rclpy gives a lifecycle node (``~/change_state`` and others). What it does is
-``LifecycleCallbacks``; rclpy's own driver is not used, since it swallows what a transition raises and cannot wait for a
-thread.
+Transitions are requested through the services that rclpy gives a lifecycle node (``~/change_state`` and others) and
+executed by ``LifecycleCallbacks``. rclpy's own driver is not used: it swallows the exceptions of a transition and
+cannot wait for a thread.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from automax_ros.ros.intake.guard import MOST_TOLD, RequestGuard
 from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred
 
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = "unconfigured", "inactive", "active", "finalized"
-"""The states that last."""
+"""The primary states."""
 CONFIGURE, CLEANUP, ACTIVATE, DEACTIVATE, SHUTDOWN = "configure", "cleanup", "activate", "deactivate", "shutdown"
 """The transitions."""
 _IDS = {
@@ -46,30 +46,30 @@ _SUCCESS, _FAILURE, _ERROR = (
 )
 
 Done = Callable[[Exception | None], None]
-"""Is told how a transition has ended: None where it succeeded."""
+"""Called at the end of a transition: with None if it succeeded, else with the error."""
 
 
 class TransitionRefused(Exception):
-    """A transition cannot be carried out now; the node keeps its state, and the text says why."""
+    """A transition cannot be executed now; the node keeps its state, and the text says why."""
 
 
 @dataclass(frozen=True)
 class Pending:
-    """The rest of a transition that goes on elsewhere: ``begin`` gets what is called, once, with how it ended."""
+    """A transition that ends later: ``begin`` gets the function to call, once, at its end."""
 
     begin: Callable[[Done], None]
 
 
 class LifecycleCallbacks(Protocol):
-    """What the transitions of a node do.
+    """The actions of a node's transitions.
 
     Raises:
-        TransitionRefused: every one of them, where it cannot be done; the node keeps its state.
-        Exception: something unforeseen, our own error: ``fail`` is called, and the node is unconfigured.
+        TransitionRefused: by any of them, if it cannot be executed; the node keeps its state.
+        Exception: an unforeseen error of the program: ``fail`` is called, and the node becomes unconfigured.
     """
 
     def refusal(self, transition: str) -> str | None:
-        """Return why a transition may not be asked for from outside, None where it may."""
+        """Return why a transition may not be requested from outside; None if it may."""
         ...
 
     def configure(self) -> Pending | None:
@@ -77,38 +77,38 @@ class LifecycleCallbacks(Protocol):
         ...
 
     def activate(self) -> Pending | None:
-        """RUN."""
+        """Put tasks into RUN."""
         ...
 
     def deactivate(self) -> None:
-        """Stop between two scans."""
+        """Stop tasks between two scans."""
         ...
 
     def cleanup(self) -> None:
-        """Leave what ``configure`` has made."""
+        """Release what ``configure`` created."""
         ...
 
     def shutdown(self) -> None:
-        """End."""
+        """Shut down."""
         ...
 
     def fail(self) -> None:
-        """Leave nothing on, whatever has failed; then the node is unconfigured."""
+        """Switch everything off after an error; then the node is unconfigured."""
         ...
 
 
 class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
-    """Lets a node be managed; to be inherited from before a class of nodes, which is initialised first."""
+    """Mixin that makes a node managed; it precedes the node class, which is initialised first."""
 
     def manage(
         self, duties: LifecycleCallbacks, guard: RequestGuard, enter: Callable[[Callable[[], None]], None]
     ) -> None:
-        """Offer the services of a lifecycle node; its state is unconfigured.
+        """Create the services of a lifecycle node; its state is unconfigured.
 
         Args:
-            duties: what its transitions do.
-            guard: what keeps requests from ending the program.
-            enter: carries out what a request asks for, at once or later, between two scans.
+            duties: the actions of its transitions.
+            guard: keeps requests from ending the program.
+            enter: executes a request between two scans, immediately or later.
         """
         LifecycleNodeMixin.__init__(self)
         self._duties, self._guard, self._enter = duties, guard, enter
@@ -120,11 +120,11 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
 
     @property
     def state(self) -> str:
-        """The node's state, such as ``active``; between two that last, such as ``configuring``."""
+        """The node's state: a primary one, such as ``active``, or a transition state, such as ``configuring``."""
         return str(self._state_machine.current_state[1])
 
     def change(self, transition: str, done: Done = lambda _: None) -> None:
-        """Carry out a transition; ``done`` is called with what it ended with, later if it must wait.
+        """Execute a transition; ``done`` is called at its end, later if it must wait.
 
         Raises:
             TransitionRefused: the node's state does not have this transition.
@@ -142,7 +142,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
             pending.begin(lambda error: self._conclude(transition, error, done))
 
     def follow(self, state: str) -> None:
-        """Take a lasting state that has come about otherwise, as when an operator has put tasks into RUN."""
+        """Enter a primary state that was reached by other means, as when an operator puts tasks into RUN."""
         for transition in _STEPS.get((self.state, state), ()):
             self._trigger(transition)
             self._trigger(_SUCCESS.to_label())
@@ -166,7 +166,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
             raise TransitionRefused(f"a node that is {self.state} has no transition {label}") from error
 
     def _conclude(self, transition: str, error: Exception | None, done: Done) -> None:
-        """End a transition: by success, by failure, or by error processing where something unforeseen was raised."""
+        """End a transition: with success, failure, or, after an unforeseen exception, error processing."""
         result = _SUCCESS if error is None else _FAILURE if isinstance(error, TransitionRefused) else _ERROR
         if result is _FAILURE:
             self._tell(transition, str(error))
@@ -216,7 +216,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
 
 
 def _name(transition: Any) -> str:
-    """Return the transition that a request means, "" if it is none: its label counts before its number."""
+    """Return the transition that a request names, "" if none; its label takes precedence over its number."""
     if transition.label:
         known = set(_IDS.values())
         return transition.label if transition.label in known else ""

@@ -1,12 +1,12 @@
-"""The node of a module with tasks, as a managed one.
+"""Managed nodes of modules with tasks.
 
-*configure* reads, checks and compiles the sources of its tasks again; *activate* puts them into RUN; *deactivate* stops
-them between two scans; *cleanup* deletes them. A running rack begins with all of them active. The state follows what
-is done to the tasks otherwise (decision): a module all of whose tasks were deleted is unconfigured, and one of whose
-tasks somebody has put into RUN is active. Stopping tasks one by one, or a STOP ALL, leaves it active (decision: as the
-node ``rack``).
+*configure* reads, checks and compiles the sources of the module's tasks again; *activate* puts them into RUN;
+*deactivate* stops them between two scans; *cleanup* deletes them. When a rack starts, all of these nodes are active.
+The state also follows what is done to the tasks by other means (decision): a module whose tasks were all deleted is
+unconfigured, and one with a task that was put into RUN is active. Stopping tasks one by one, or a STOP ALL, leaves it
+active (decision: as the node ``rack``).
 
-Work that takes long: on a thread of its own, and back to the node's executor with what came of it.
+Long work is done on a separate thread, which passes its result to the node's executor.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from automax_ros.ros.base.node import ModuleNode, RackContext
 class Background:
     """Does long work for one node while the rack scans.
 
-    The thread keeps no program from ending: what it works at then is lost.
+    The thread does not keep the program from ending; unfinished work is lost then.
     """
 
     def __init__(self, node: Node) -> None:
-        """Take the node whose executor is to go on."""
+        """Store the node whose executor gets the results."""
         self._node, self._closed = node, False
 
     def do(self, work: Callable[[], Any], finish: Callable[[Any, Exception | None], None]) -> None:
-        """Let a thread do ``work``; then the executor calls ``finish`` with what it returned, and what it raised."""
+        """Call ``work`` on a thread; then the executor calls ``finish`` with its result and its exception."""
         executor = self._node.executor
 
         def finished(result: Any, error: Exception | None) -> None:
@@ -58,19 +58,19 @@ class Background:
         threading.Thread(target=run, name=f"{self._node.get_name()} work", daemon=True).start()
 
     def close(self) -> None:
-        """Forget what is under way."""
+        """Discard the results of work in progress."""
         self._closed = True
 
 
 NOT_OPERATED = "the rack's YAML file does not say `operator: true`"
-"""Why nobody outside may ask for a transition that stops or runs tasks."""
+"""Why a requested transition that stops or runs tasks is refused."""
 DEACTIVATED = "the node rack was deactivated"
-"""The reason of the STOP ALL that makes the modules' nodes inactive too, in whatever process they are."""
+"""Reason of the STOP ALL that makes the nodes of the modules inactive too, in every process."""
 _BEFORE_THE_RACK = "the rack has not been activated yet: activate its node rack first"
 
 
 class ManagedModuleNode(LifecycleNode, ModuleNode):
-    """Serves one module and lets a lifecycle manager stop, delete, reload and run its tasks."""
+    """Node of one module; a lifecycle manager can stop, delete, reload and run its tasks."""
 
     def __init__(self, site: RackContext, module: Module) -> None:
         """Join the graph: the tasks are installed, so the node is inactive."""
@@ -82,14 +82,14 @@ class ManagedModuleNode(LifecycleNode, ModuleNode):
         self.follow(INACTIVE)
 
     def follow_operation(self, operation: Operation) -> None:
-        """Take the state that an operation has brought the tasks into."""
+        """Update the node's state after an operation."""
         if operation.what == "stop_all" and operation.reason == DEACTIVATED:
             self.follow(INACTIVE)
         elif operation.ok:
             self.follow_tasks()
 
     def follow_tasks(self) -> None:
-        """Take the state that the tasks are in."""
+        """Update the node's state from that of the tasks."""
         state = self._duties_of_tasks.state
         if state is not None:
             self.follow(state)
@@ -105,7 +105,7 @@ class ManagedModuleNode(LifecycleNode, ModuleNode):
 
 
 class ModuleLifecycle:
-    """What the transitions of a module's node do to its tasks."""
+    """The transitions of a module's node: their effect on its tasks."""
 
     def __init__(self, node: ManagedModuleNode, module: Module) -> None:
         self._node, self._site = node, node.site
@@ -113,7 +113,7 @@ class ModuleLifecycle:
 
     @property
     def state(self) -> str | None:
-        """The state that the tasks alone tell, None where every state is as good."""
+        """The state that follows from the tasks; None if the present state fits them."""
         if self._tasks.are_deleted:
             return UNCONFIGURED
         if self._tasks.is_running:
@@ -121,13 +121,13 @@ class ModuleLifecycle:
         return INACTIVE if self._node.state == UNCONFIGURED else None
 
     def refusal(self, _: str) -> str | None:
-        """Only an operated rack's modules may be stopped, and not before it was started."""
+        """Refuse transitions of a rack that has no operator or was not started."""
         if not self._site.rack.config.operator:
             return NOT_OPERATED
         return None if self._site.stream.has_begun else _BEFORE_THE_RACK
 
     def configure(self) -> Pending:
-        """Reload the deleted tasks from their files; with an error in one of them none is there."""
+        """Reload the deleted tasks from their files; if one has an error, none is installed."""
         return Pending(lambda finish: self._reload(self._tasks.deleted, finish))
 
     def activate(self) -> None:
@@ -135,7 +135,7 @@ class ModuleLifecycle:
         self._asked(self._tasks.run)
 
     def deactivate(self) -> None:
-        """Stop the tasks; a critical one does not stop alone."""
+        """Stop the tasks; a critical one cannot be stopped on its own."""
         self._asked(self._tasks.stop)
 
     def cleanup(self) -> None:
@@ -148,7 +148,7 @@ class ModuleLifecycle:
         self._asked(self._tasks.delete)
 
     def fail(self) -> None:
-        """STOP ALL, so that no output stays on, and leave no task of the module."""
+        """STOP ALL, so that no output stays on, and delete the module's tasks."""
         operations = self._site.rack.operations
         if operations.powered:
             operations.stop_all(f"a transition of {self._node.get_name()} failed")
@@ -161,7 +161,7 @@ class ModuleLifecycle:
             raise TransitionRefused(str(refused)) from refused
 
     def _reload(self, names: list[str], finish: Callable[[Exception | None], None]) -> None:
-        """Reload tasks one after the other, and ``finish``."""
+        """Reload tasks one after the other, then call ``finish``."""
         if not names:
             finish(None)
             self._node.follow_tasks()
@@ -186,8 +186,8 @@ class ModuleLifecycle:
         self._node.work.do(lambda: self._orders.prepare(name, self._tasks.source(name)), prepared)
 
     def _given_up(self, name: str, fault: Exception) -> Exception:
-        """Take those that are there again out, and return what the transition ends with."""
-        with suppress(OperationRefused):  # somebody has put one into RUN meanwhile
+        """Delete the tasks reloaded so far, and return the error of the transition."""
+        with suppress(OperationRefused):  # one was put into RUN meanwhile
             self._tasks.delete()
         for text in getattr(fault, "findings", ()) if isinstance(fault, ReloadRefused) else ():
             self._node.get_logger().error(text)

@@ -1,6 +1,6 @@
-"""What the nodes of all kinds of module share: the rack they serve, and the door through which ROS enters it.
+"""Base classes of a rack's nodes, and what these share: the rack and its message intake.
 
-A node in a rack's namespace, on the rack's time, that no client's request ends.
+The nodes are in the rack's namespace and on its time, and no client's request ends them.
 """
 
 from __future__ import annotations
@@ -42,28 +42,28 @@ from automax_ros.runtime.health import Health
 from automax_ros.runtime.time.pacer import Pace
 
 MAIN_NODE = "rack"
-"""The node that ``__node`` without a name means."""
+"""The node that a rule ``__node`` without a node's name renames."""
 SIM_TIME = "use_sim_time"
-"""The parameter of every node that says whether its time is that of ``/clock``."""
+"""Parameter of every node: whether its time is that of ``/clock``."""
 _OF_RCLPY = (SIM_TIME, "start_type_description_service")
 
 
 class RackRosNode(Node):  # type: ignore[misc]
-    """A node with a guard for the services that rclpy gives it."""
+    """A node whose services created by rclpy are guarded."""
 
     _door: MessageIntake | None = None
 
     def __init__(
         self, name: str, namespace: str, context: Context, health: Health, arguments: RosArguments = NO_ARGUMENTS
     ) -> None:
-        """Join the graph; ``namespace`` is the rack's, without a slash at its head."""
+        """Join the graph; ``namespace`` is the rack's, without a leading slash."""
         self._adopted: set[Any] = set()
         follows = follows_clock(arguments, namespace)
         own_time = [Parameter(SIM_TIME, value=follows)]
         space = f"/{namespace}"
         self.own_name = name
         name = arguments.name_of(name, main=name == MAIN_NODE)
-        # Rules of a foreign context that are for all nodes must not put the rack elsewhere, or give all one name.
+        # Rules of a foreign context for all nodes must not move the rack, or give all its nodes one name.
         own_place = ["--ros-args", "-r", f"__ns:={space}", "-r", f"__node:={name}"]
         super().__init__(name, namespace=space, context=context, cli_args=own_place, parameter_overrides=own_time)
         self.add_on_set_parameters_callback(partial(_keep_time, follows))
@@ -71,13 +71,13 @@ class RackRosNode(Node):  # type: ignore[misc]
         self.guard.services(self)
 
     def declare_facts(self, facts: Mapping[str, tuple[bool | int | float | str, str]]) -> None:
-        """Declare parameters that nobody can set: value and description by name."""
+        """Declare read-only parameters: value and description by name."""
         for name, (value, text) in facts.items():
             descriptor = ParameterDescriptor(description=text, read_only=True)
             self.declare_parameter(name, value, descriptor, ignore_override=True)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter[Any]]) -> SetParametersResult:
-        """Set parameters; the reason names what is near where the node has none of the name."""
+        """Set parameters; for an unknown name the reason suggests similar ones."""
         for parameter in parameter_list:
             if not self.has_parameter(parameter.name):
                 known = [name for name in self.list_parameters([], 0).names if name not in _OF_RCLPY]
@@ -87,15 +87,15 @@ class RackRosNode(Node):  # type: ignore[misc]
         return super().set_parameters_atomically(parameter_list)
 
     def served_by(self, door: MessageIntake) -> None:
-        """Let requests come in at a door, to services that are created later too; before an executor has the node.
+        """Receive requests through a message intake, also for services created later.
 
-        Where rcl is not found an executor serves them, as ever.
+        Call it before an executor has the node. Where rcl is not found the executor serves requests, as usual.
         """
         self._door = door
         self.adopt_services()
 
     def adopt_services(self) -> None:
-        """Let requests to services that rclpy has made since come in at the door, if there is one."""
+        """Add the services that rclpy has created since to the message intake, if there is one."""
         rcl = library()
         if rcl is None or self._door is None:
             return
@@ -105,21 +105,21 @@ class RackRosNode(Node):  # type: ignore[misc]
 
     @property
     def services(self) -> Iterator[Any]:
-        """What an executor serves: not the services whose requests come in at a door."""
+        """The services for an executor: those that the message intake does not serve."""
         return iter([service for service in super().services if service not in self._adopted])
 
     def create_service(self, *arguments: Any, **options: Any) -> Any:
-        """Create a service as rclpy does."""
+        """Create a service as rclpy does, and add it to the message intake."""
         made = super().create_service(*arguments, **options)
         self.adopt_services()
         return made
 
 
 def follows_clock(arguments: RosArguments, namespace: str) -> bool:
-    """Return whether a rack is told to follow ``/clock``: by ``use_sim_time`` for all nodes, or for the node ``rack``.
+    """Return whether a rack is to follow ``/clock``: ``use_sim_time`` is set for all nodes, or for the node ``rack``.
 
     Raises:
-        RosArgumentsError: it is neither true nor false.
+        RosArgumentsError: ``use_sim_time`` is neither true nor false.
     """
     item = arguments.given_to(MAIN_NODE, namespace, main=True).get(SIM_TIME)
     if item is not None and not isinstance(item.value, bool):
@@ -128,7 +128,7 @@ def follows_clock(arguments: RosArguments, namespace: str) -> bool:
 
 
 def _keep_time(follows: bool, parameters: list[Parameter[Any]]) -> SetParametersResult:
-    """Refuse another ``use_sim_time`` than at the start: the rack's time is what its messages are stamped with."""
+    """Refuse to change ``use_sim_time`` after the start: messages are stamped with the rack's time."""
     if all(parameter.name != SIM_TIME or parameter.value is follows for parameter in parameters):
         return SetParametersResult(successful=True)
     own = "the rack follows /clock" if follows else "the rack keeps its own time"
@@ -139,18 +139,18 @@ def _keep_time(follows: bool, parameters: list[Parameter[Any]]) -> SetParameters
 
 @dataclass(frozen=True)
 class RackContext:
-    """One rack that lives in this process, as its nodes see it.
+    """One rack in this process, and what its nodes share.
 
     Attributes:
         rack: the rack.
-        stream: the messages that it sends.
-        pacer: what keeps its time.
-        context: of all its nodes.
-        health: where they report trouble.
-        door: where messages and requests come in.
-        arguments: what they were told by the command line.
-        diagnostics: what they tell of their health.
-        lock: held by whoever touches the rack; one thread at a time, between scans.
+        stream: the messages that it publishes.
+        pacer: keeps its time.
+        context: rclpy's context of all nodes.
+        health: counts the problems that they report.
+        door: receives messages and requests.
+        arguments: their ROS arguments from the command line.
+        diagnostics: publishes their health.
+        lock: held by the thread that accesses the rack; one at a time, between scans.
     """
 
     rack: Rack
@@ -170,14 +170,14 @@ class RackContext:
 
     @contextmanager
     def between_scans(self) -> Iterator[None]:
-        """Enter the rack from outside: between two scans, and what happens is stamped with its own instant."""
+        """Access the rack between two scans; rack time catches up first, so stamps are those of the present."""
         with self.lock:
             self.pacer.catch_up()
             yield
 
 
 class ModuleNode(RackRosNode):
-    """A module's node: in the rack's namespace, on its time, and safe from what clients ask of its parameters."""
+    """A module's node: in the rack's namespace, on its time, and guarded against bad parameter requests."""
 
     def __init__(self, site: RackContext, name: str) -> None:
         """Join the graph."""
@@ -187,17 +187,17 @@ class ModuleNode(RackRosNode):
 
     @property
     def subscriptions(self) -> Iterator[Any]:
-        """What an executor serves: not what is taken at the rack's door."""
+        """The subscriptions for an executor: those that the message intake does not read."""
         return (item for item in super().subscriptions if item.callback is not _no_callback)
 
     def own_subscription(
         self, kind: Any, topic: str, qos: QoSProfile, events: SubscriptionEventCallbacks | None = None
     ) -> Any:
-        """Return a subscription that no executor serves, for the rack's door; ``kind`` is the message's class."""
+        """Return a subscription for the message intake, which no executor serves; ``kind`` is the message's class."""
         return self.create_subscription(kind, topic, _no_callback, qos, event_callbacks=events, raw=True)
 
     def outlet(self, topic: Topic, joined: Callable[[], None] | None = None) -> Take:
-        """Return what publishes the messages of a topic. ``joined`` is called for each reader that comes."""
+        """Return a function that publishes messages of a topic. ``joined`` is called for each new subscriber."""
 
         def matched(info: QoSPublisherMatchedInfo) -> None:
             if joined is not None and info.total_count_change > 0:
@@ -215,7 +215,7 @@ class ModuleNode(RackRosNode):
         return lambda _, payload: publish(payload)
 
     def diagnose(self, statuses: Source) -> None:
-        """Let ``/diagnostics`` have what ``statuses`` returns for a rack time (ns)."""
+        """Publish on ``/diagnostics`` what ``statuses`` returns for a rack time (ns)."""
         site = self.site
         if not site.diagnostics.begun:
             site.diagnostics.begin(site.rack, site.stream, site.pacer, self)
@@ -228,14 +228,14 @@ class ModuleNode(RackRosNode):
         return status_of(name, f"{config.name} slot {slot}", level, text, values)
 
     def misfit(self, what: str, info: QoSOfferedIncompatibleQoSInfo | QoSRequestedIncompatibleQoSInfo) -> None:
-        """Report a reader or writer with an incompatible quality of service; ``what`` says what is lost."""
+        """Report a subscriber or publisher with an incompatible quality of service; ``what`` says what is lost."""
         policy = str(qos_policy_name_from_kind(info.last_policy_kind)).lower()
         text = f"{what}: its quality of service does not fit ({policy})"
         self.site.health.note("QoS conflict", what, lambda: text, times=info.total_count_change)
         self.get_logger().warning(text)
 
     def guarded_callback(self, what: str, action: Callable[..., None]) -> Callable[..., None]:
-        """Return an action as a callback: in the rack's present, between two scans, its exceptions reported."""
+        """Wrap a function as a callback that runs between two scans and reports its exceptions."""
 
         def entered(*arguments: Any) -> None:
             with self.site.between_scans():
@@ -248,4 +248,4 @@ class ModuleNode(RackRosNode):
 
 
 def _no_callback(_: Any) -> None:
-    """Stand in for the callback of a subscription that is taken from at the rack's door."""
+    """Do nothing: the message intake reads the subscription."""

@@ -1,6 +1,6 @@
-"""The health of a rack as a whole, as ``/diagnostics`` has it: ``pm1/rack: PM1``.
+"""The health of a rack as a whole on ``/diagnostics``: ``pm1/rack: PM1``.
 
-Of a rack in several processes each other process has a status of its own in its place: ``pm1/processor_3: process``.
+In a rack of several processes each other process has its own status instead: ``pm1/processor_3: process``.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ OVERRUNS = "overruns"
 
 
 class RackHealth:
-    """Says how one rack stands, and what went wrong around it, as far as it is in this process.
+    """Reports the state of one rack, and the problems around it, for the part in this process.
 
-    ERROR while a fault has stopped it; WARN while it is halted, without power or stopped by command, and where scans
+    ERROR while a fault has stopped it; WARN while it is halted, without power or stopped by command, and if scans
     were skipped or something was refused since the last report; else OK.
     """
 
     def __init__(self, site: RackContext, part: str) -> None:
-        """Take a rack; ``part`` is what the status is called, without the rack's namespace."""
+        """Create it for a rack; ``part`` is the name of the status without the rack's namespace."""
         self._site, self._part = site, part
 
     def statuses(self, now_ns: int) -> list[DiagnosticStatus]:
@@ -53,7 +53,7 @@ class RackHealth:
         return [status_of(name, rack.config.name, level, text, values)]
 
     def _judged(self, skipped: int, troubles: int) -> tuple[bytes, str]:
-        """Return level and text; what counts most first."""
+        """Return level and text of the most serious condition."""
         operations, diagnostics = self._site.rack.operations, self._site.diagnostics
         newly_skipped = diagnostics.newly(OVERRUNS, skipped)
         newly_troubled = diagnostics.newly("troubles", troubles)

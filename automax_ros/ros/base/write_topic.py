@@ -1,7 +1,4 @@
-"""Values in an engineer's unit that ROS writes: as counts, within their scale.
-
-A topic through which ROS enters the rack.
-"""
+"""Topics by which ROS writes to a rack, and the conversion of values in engineering units to counts."""
 
 from __future__ import annotations
 
@@ -24,21 +21,22 @@ from automax_ros.ros.intake.rcl import library
 from automax_ros.runtime.memory.views import MemoryValueError
 
 REFUSAL_INTERVAL_S = 1.0
-"""What is refused on one topic is logged at most this often."""
+"""Refusals on one topic are logged at most this often."""
 COMMAND = QosProfile("reliable", "volatile", "keep_last", 10)
 BEST_EFFORT_COMMAND = QosProfile("best_effort", "volatile", "keep_last", 10)
 REFUSED = "refused write"
 DROPPED = "dropped message"
-"""What ``Health`` counts: messages that DDS dropped, for more came than the door takes."""
+"""Counted by ``Health``: messages that DDS dropped because they arrived faster than they were taken."""
 
 
 class WriteTopic:
-    """Hears a topic's messages from reliable and best-effort publishers; ``take`` is called between two scans.
+    """Receives a topic's messages from reliable and best-effort publishers; calls ``take`` between two scans.
 
-    Messages wait in DDS, ten of them at most, and are taken at the rack's door (``Door``) as bytes: what is longer than
-    the topic's messages can be, or not one of them, is refused unread. A reliable subscription alone would not hear
-    best-effort publishers, a best-effort one alone would lose messages of reliable ones. So a best-effort one is opened
-    when such a publisher comes; of the two copies that then come of a reliable one's messages the second is dropped.
+    Messages wait in DDS, at most ten of them, and ``MessageIntake`` takes them as bytes: one that is malformed, or
+    longer than the topic's messages can be, is refused unread. A reliable subscription alone would not match
+    best-effort publishers; a best-effort one alone would lose messages of reliable ones. So a best-effort one is
+    created when such a publisher appears; messages of reliable publishers then arrive twice, and the second copy is
+    discarded.
     """
 
     def __init__(
@@ -47,11 +45,11 @@ class WriteTopic:
         """Subscribe.
 
         Args:
-            node: whose topic it is.
-            topic: its name.
-            type_name: of its messages, such as ``std_msgs/msg/Int16``.
-            take: gets the decoded message (one of ``wire.messages``), in the rack's present.
-            most_bytes: size of the longest message that makes sense, without its header of 4 bytes.
+            node: the node that subscribes.
+            topic: the topic's name.
+            type_name: the type of its messages, such as ``std_msgs/msg/Int16``.
+            take: called between two scans with the decoded message (a class of ``messages/types/messages``).
+            most_bytes: size of the longest valid message, without its header of 4 bytes.
         """
         self._node, self._topic, self._type_name = node, topic, type_name
         self._take = node.guarded_callback(topic, take)
@@ -63,7 +61,7 @@ class WriteTopic:
         )
 
     def refuse(self, of: str, reason: Exception) -> None:
-        """Tell, not too often, that a message was not taken; ``of`` is what it would have written."""
+        """Report a refused message, at most once per second in the log; ``of`` is what it would have written."""
         refusal = f"write refused: {reason}"
         self._node.site.health.note(REFUSED, of, lambda: refusal)
         if self._throttle.passes():
@@ -81,7 +79,7 @@ class WriteTopic:
             self._subscribe(BEST_EFFORT_COMMAND, None)
 
     def receive(self, taken: RawMessage, *, reliable: bool) -> None:
-        """Deal with a message that was taken."""
+        """Check a message that was taken, and pass it on or refuse it."""
         if taken.sender:
             missing = self._senders.missing(taken)
             if missing is None:
@@ -109,7 +107,7 @@ class WriteTopic:
 
 
 class _Way:
-    """One of an inlet's two subscriptions, as the door serves it."""
+    """One of the two subscriptions of a ``WriteTopic``, as ``MessageIntake`` reads it."""
 
     def __init__(self, inlet: WriteTopic, subscription: Any, most_bytes: int, *, reliable: bool) -> None:
         self.name, self.handle = subscription.topic_name, subscription.handle
@@ -124,17 +122,17 @@ class _Way:
         return taken is not None
 
     def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Let rcl call a function for each message."""
+        """Set the C function that rcl calls for each message."""
         rcl = library()
         assert rcl is not None
         return int(rcl.on_message(pointer, callback, data))
 
 
 class ScaledWriter:
-    """The counts of what one topic writes to a variable. Beyond the scale a value is clamped, and told once."""
+    """Converts a topic's values to counts of a variable. Values beyond the scale are clamped; the first is logged."""
 
     def __init__(self, node: ModuleNode, topic: str, variable: CommonVariable, scale: Scale, unit: str) -> None:
-        """Begin with nothing told; ``unit`` stands in messages."""
+        """Create it; ``unit`` appears in messages."""
         self._node, self._topic, self._variable = node, topic, variable
         self._scale, self._unit, self._is_told = scale, unit, False
 
@@ -142,7 +140,7 @@ class ScaledWriter:
         """Return the counts of a value.
 
         Raises:
-            MemoryValueError: not a finite number.
+            MemoryValueError: the value is not finite.
         """
         if not math.isfinite(value):
             raise MemoryValueError(f"{value!r} is not a value for {self._variable.name}")

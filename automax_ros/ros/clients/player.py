@@ -1,4 +1,4 @@
-"""The node ``player``: sends the messages of a recording again, on absolute deadlines of the wall clock.
+"""The node ``player``: publishes the messages of a recording again, at absolute deadlines on the wall clock.
 
 Publishes: each topic of the recording, with its recorded quality of service; ``/clock`` (rosgraph_msgs/Clock) with the
 time of the recording, 100 times per second of the wall clock.
@@ -34,14 +34,14 @@ from automax_ros.ros.setup.process import joined_context, make_executor
 from automax_ros.runtime.health import Health
 
 CLOCK_PERIOD_NS = 10 * NS_PER_MS
-"""How often ``/clock`` is sent."""
+"""Period of ``/clock``."""
 DISCOVERY_NS = 3500 * NS_PER_MS
-"""Time between the topics' appearance and the first message: DDS announces itself each 3 s, so by then who listens has
-found them, and a rack that is live has been seen (decision)."""
+"""Time between the creation of the topics and the first message: DDS announces itself each 3 s, so by then subscribers
+have found them, and a rack that is live has been seen (decision)."""
 LEAD_NS = 20 * NS_PER_MS
-"""Time before the first message in which latched facts of the past are sent."""
+"""Time before the first message in which earlier latched messages are published."""
 ACKNOWLEDGE_NS = 2 * NS_PER_S
-"""How long readers may take at the end to confirm the last messages."""
+"""How long subscribers may take at the end to acknowledge the last messages."""
 _LONGEST_WAIT_NS = 50 * NS_PER_MS
 _CHORE_NS = 20 * NS_PER_MS
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)")
@@ -68,7 +68,7 @@ class Lateness:
 
 
 class Player:
-    """Plays the span of a survey at ``rate`` times its own pace; ``close`` in any case.
+    """Plays the span of a survey at ``rate`` times its original speed; always call ``close``.
 
     Raises:
         RosUnavailable: ROS cannot be initialised.
@@ -113,7 +113,7 @@ class Player:
         return str(self._node.get_fully_qualified_name())
 
     def look_around(self, stopping: Callable[[], bool], *, for_racks: bool) -> list[str]:
-        """Let readers find the topics; return the namespaces in which a rack is live, at once if there is one."""
+        """Wait for subscribers to find the topics; return the namespaces with a live rack, as soon as one is seen."""
         spaces = [self._renaming.space(space) for space in self._survey.spaces if for_racks]
         own = {publisher.topic_name for publisher in self._node.publishers}
         deadline = time.monotonic_ns() + DISCOVERY_NS
@@ -127,7 +127,7 @@ class Player:
 
     @property
     def clock_taken(self) -> bool:
-        """Whether another node sends ``/clock`` too."""
+        """Whether another node publishes ``/clock`` too."""
         return self._clock is not None and self._node.count_publishers("/clock") > 1
 
     def open(self) -> None:
@@ -142,7 +142,7 @@ class Player:
             self._clock = self._node.create_publisher(kind, "/clock", 1)
 
     def play(self, stopping: Callable[[], bool], on_idle: Callable[[], None]) -> bool:
-        """Send the span once; return whether it was not stopped. ``on_idle`` is called now and then.
+        """Publish the span once; return False if stopped. ``on_idle`` is called now and then.
 
         Raises:
             BagError: a message is malformed.
@@ -164,7 +164,7 @@ class Player:
         return True
 
     def settle(self, stopping: Callable[[], bool]) -> None:
-        """Wait until readers have confirmed the last messages, or it takes too long."""
+        """Wait until subscribers have acknowledged the last messages, at most ``ACKNOWLEDGE_NS``."""
         deadline = time.monotonic_ns() + ACKNOWLEDGE_NS
         for outlet in self._outlets.values():
             while outlet.unconfirmed() and time.monotonic_ns() < deadline and not stopping():
@@ -195,7 +195,7 @@ class Player:
         self._outlets[topic.name] = outlet
 
     def _hash_of(self, topic: str) -> str:
-        """Return the type hash of our own publisher, empty if it is not told."""
+        """Return the type hash of our own publisher, empty if it is unknown."""
         own = (self._node.get_name(), self._node.get_namespace())
         for item in self._node.get_publishers_info_by_topic(topic):
             if (item.node_name, item.node_namespace) == own and item.topic_type_hash.version > 0:
@@ -210,7 +210,7 @@ class Player:
         self._next_chore = 0
 
     def _wait(self, now: int, due: int, stopping: Callable[[], bool], on_idle: Callable[[], None]) -> bool:
-        """Serve ROS until the next deadline, a clock tick or a moment has passed; False if it is time to stop."""
+        """Serve ROS until the next deadline or clock tick, or for a moment; return False if asked to stop."""
         if self.paused:
             self._shift(now)
         elif now >= self._next_clock:
@@ -228,7 +228,7 @@ class Player:
         return True
 
     def _shift(self, now: int) -> None:
-        """Move all deadlines by the time that has passed in the pause."""
+        """Move all deadlines by the time spent in the pause."""
         passed = max(0, now - self._paused_since)
         self._paused_since += passed
         self._zero_ns += passed
@@ -265,14 +265,14 @@ class Player:
 
 
 class _Outlet:
-    """A publisher with what its messages need."""
+    """A publisher, and the check of its messages."""
 
     def __init__(self, publisher: Publisher[Any], topic: PlayTopic, kind: Any) -> None:
         self.publisher, self.topic, self._kind = publisher, topic, kind
         self._decode = decoder(topic.type_name) if topic.type_name in message_types() else None
 
     def check(self, data: bytes) -> None:
-        """Make sure that readers can take a message.
+        """Check that subscribers can read a message.
 
         Raises:
             CdrError: they cannot.
@@ -286,7 +286,7 @@ class _Outlet:
             raise CdrError(f"not of type {self.topic.type_name}: {str(error)[:120]}") from error
 
     def unconfirmed(self) -> bool:
-        """Whether a reader has not confirmed all messages yet."""
+        """Whether a subscriber has not acknowledged all messages yet."""
         from rclpy.duration import Duration
 
         return not self.publisher.wait_for_all_acked(Duration(nanoseconds=NS_PER_MS))

@@ -20,28 +20,28 @@ from automax_ros.ros.setup.process import joined_context
 
 _LOOK_S = 0.05
 _SETTLED_NS = 2 * NS_PER_S
-"""A rack whose nodes have been seen for so long without its operator has none (decision)."""
+"""A rack whose nodes have been seen this long without its operator has none (decision)."""
 ALONE_NS = participants.ALONE_NS
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _HOME, _OPERATOR = "common_memory", "operator"
 
 
 class NotOperable(UserError):
-    """There is no such rack, it has no operator, there are several of the name, or it does not answer."""
+    """The rack is not found, has no operator, does not answer, or there are several of its name."""
 
 
 class Interrupted(Exception):
-    """The person does not wait any longer."""
+    """The user has stopped waiting."""
 
 
 class RackClient:
-    """One program's access to the operator of a rack; a context manager. ``space`` is the namespace with its slash.
+    """Client of a rack's operator; a context manager. ``space`` is the rack's namespace with its slash.
 
     ``should_stop`` ends all waiting.
 
     Raises:
         RosUnavailable: ROS cannot be initialised.
-        Interrupted: ``find`` and ``call``, where asked to stop.
+        Interrupted: by ``find`` and ``call``, if asked to stop.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class RackClient:
         self._context.try_shutdown()
 
     def find(self, wait_ns: int, alone_ns: int = 0) -> None:
-        """Wait until the rack is seen with its operator, and no other of its name for ``alone_ns`` from then on.
+        """Wait until the rack and its operator are seen, and no other rack of its name for ``alone_ns`` from then on.
 
         Raises:
             NotOperable: no such rack within the time, one without an operator, or several of the name.
@@ -84,7 +84,7 @@ class RackClient:
         while True:
             now = time.monotonic_ns()
             racks, operators = self._racks(), self._nodes(_OPERATOR)
-            # The names of a program's nodes come in a message of their own, on a busy host long after its topics.
+            # Node names arrive in a separate message, on a busy host long after the topics.
             if seen is None and racks and self._nodes(_HOME):
                 seen = now
             self.refuse_several(max(racks, operators))
@@ -101,7 +101,7 @@ class RackClient:
             time.sleep(_LOOK_S)
 
     def refuse_twins(self, node: str) -> None:
-        """Look for ``ALONE_NS`` whether a node of the rack, which may have no operator, is there more than once.
+        """Check for ``ALONE_NS`` that a node of the rack, which may have no operator, exists only once.
 
         Raises:
             NotOperable: there are several racks of the name.
@@ -115,7 +115,7 @@ class RackClient:
             time.sleep(_LOOK_S)
 
     def refuse_several(self, racks: int) -> None:
-        """Do nothing where at most one rack of the name is known.
+        """Check that at most one rack of the name is known.
 
         Raises:
             NotOperable: there are several.
@@ -125,10 +125,10 @@ class RackClient:
             raise NotOperable(f"{racks} racks are called {self._space}", hint)
 
     def call(self, kind: Any, name: str, request: Any, wait_ns: int) -> Any:
-        """Ask a service of the rack and return its answer.
+        """Call a service of the rack and return its response.
 
         Raises:
-            NotOperable: no answer within the time, or none that can be read.
+            NotOperable: no response within the time, or an unreadable one.
         """
         asking = self._clients.get(name)
         if asking is None:
@@ -152,7 +152,7 @@ class RackClient:
             raise NotOperable(f"rack {self._space} does not answer on {name}", hint)
         try:
             self._executor.spin_once(timeout_sec=_LOOK_S)
-        except Exception as error:  # whatever rclpy makes of malformed bytes
+        except Exception as error:  # rclpy raises different ones for malformed bytes
             if not self._context.ok():
                 raise
             hint = "look who else serves its operator's services in this ROS domain"

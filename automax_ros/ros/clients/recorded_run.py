@@ -1,15 +1,13 @@
-"""Binds a recorder to the run that it records: only what this run's programs send is the rack's.
+"""Binds a recorder to the run that it records: only messages from this run's programs are recorded.
 
-The rack's program is the participant that publishes all topics of a rack (``racks_of``); where it is cut into
-processes, the others are those whose presence on the bus names the same run. What others publish on the rack's topics
-is left out, counted and told once for each topic. Where the middleware does not tell senders (rcl is not found) all
-pass, and the person is told.
+The rack's program is the participant that publishes all topics of a rack (``racks_of``); in a distributed rack, the
+other processes are those whose presence on the bus names the same run. Messages of other programs on the rack's topics
+are discarded, counted and reported once per topic. Where the middleware does not identify senders (rcl is not found)
+all messages pass, and the user is told.
 
-Who sends what in the graph: publishers told apart by their GID, programs by the part of it that they share.
-
-The first 12 bytes of a GID are the DDS participant's, which is a program's context; the graph and each message tell
-them. A program that wants to be taken for another one's participant must send with its GID: against that helps SROS 2
-alone (docs/ros.md).
+Publishers are distinguished by their GID. Its first 12 bytes identify the DDS participant, which is a program's
+context; the graph and each message contain them. A program can only pass for another one's participant by sending
+with its GID; only SROS 2 prevents that (docs/ros.md).
 """
 
 from __future__ import annotations
@@ -26,14 +24,14 @@ from automax_ros.ros.intake.rcl import library
 
 PREFIX_BYTES = 12
 ALONE_NS = NS_PER_S
-"""A rack that is to be operated must be the only one of its name for so long (decision): programs of a host answer one
-that joins at once, but not in the same moment."""
+"""A rack to be operated must be the only one of its name for this long (decision): programs of a host answer a new one
+at once, but not in the same moment."""
 HOME_TOPICS = ("variables", "config", "backplane", "backplane/snapshot", "operations")
-"""Whoever publishes all of these below a namespace is the rack of that name, or its process of common memory."""
+"""The participant that publishes all of these in a namespace is the rack, or its process with common memory."""
 
 
 def participant(gid: bytes) -> bytes:
-    """Return what the GIDs of one program have in common; empty where the GID is not known."""
+    """Return the part of a GID that all publishers of one program share; empty if the GID is unknown."""
     return gid[:PREFIX_BYTES]
 
 
@@ -43,7 +41,7 @@ def publishing(node: Node, topic: str) -> set[bytes]:
 
 
 def racks_of(node: Node, space: str) -> set[bytes]:
-    """Return the participants that are a rack with a namespace (with its slash): one, unless two have one name."""
+    """Return the participants that are a rack of a namespace (with its slash): one, unless two have the same name."""
     found: set[bytes] | None = None
     for topic in HOME_TOPICS:
         there = publishing(node, f"{space}/{topic}")
@@ -54,20 +52,20 @@ def racks_of(node: Node, space: str) -> set[bytes]:
 
 
 SILENT_NS = 3 * NS_PER_S
-"""A rack that sends nothing for so long while another of its name sends a table has been started again (decision: one
+"""If a rack is silent this long while another of its name publishes its variable table, it was restarted (decision: one
 that was killed stands in the graph for up to 20 s)."""
 LOOK_NS = NS_PER_S // 4
 GRACE_NS = NS_PER_S
-"""A process of the rack may be heard for so long before its presence is."""
+"""Messages of a process of the rack may arrive this long before its presence."""
 MOST_TABLES = 16
-"""Most tables of others that are kept."""
+"""Most tables of other programs that are kept."""
 MOST_PROCESSES = 64
 """Most processes of one rack."""
 
 
 @dataclass
 class UnknownPublisher:
-    """A program that is not known to be the rack's: since when (ns), and how much it sent on each topic."""
+    """A program not known to be the rack's: when it was first seen (ns), and its number of messages per topic."""
 
     since_ns: int
     sent: Counter[str] = field(default_factory=Counter)
@@ -77,7 +75,7 @@ class RecordedRun:
     """The programs of one run of one rack."""
 
     def __init__(self, node: Node, space: str) -> None:
-        """Bound to nobody; ``space`` is the rack's namespace with its slash."""
+        """Create it unbound; ``space`` is the rack's namespace with its slash."""
         self._node, self._space = node, space
         self._home = b""
         self._others: set[bytes] = set()
@@ -94,18 +92,18 @@ class RecordedRun:
         return racks_of(self._node, self._space)
 
     def bind(self, sender: bytes) -> None:
-        """Bind to the program that sent a rack's table."""
+        """Bind to the program that published a rack's table."""
         self._home, self._others, self._last_ns = participant(sender), set(), time.monotonic_ns()
 
     def admit(self, sender: bytes) -> None:
-        """Let another process of the same run be one of the rack's."""
+        """Accept another process of the same run."""
         if len(self._others) < MOST_PROCESSES:
             self._others.add(participant(sender))
             self._strangers.pop(participant(sender), None)
 
     @property
     def is_there(self) -> bool:
-        """Whether the rack's program is in the graph. Another rack of its name is told once."""
+        """Whether the rack's program is in the graph. Another rack of its name is reported once."""
         racks = self.racks()
         if self._home in racks and len(racks) > 1 and not self._has_rival:
             self._has_rival = True
@@ -113,7 +111,7 @@ class RecordedRun:
         return not self.tells_senders or self._home in racks
 
     def is_ours(self, topic: str, taken: RawMessage) -> bool:
-        """Return whether a message comes from the rack; one of another's is counted and told."""
+        """Return whether a message comes from the rack; those of other programs are counted for ``look``."""
         if not self.tells_senders:
             return True
         sender = participant(taken.sender)
@@ -127,11 +125,11 @@ class RecordedRun:
 
     @property
     def refused(self) -> int:
-        """How many messages of other programs were left out."""
+        """Number of messages of other programs that were discarded."""
         return sum(stranger.sent.total() for stranger in self._strangers.values())
 
     def look(self) -> None:
-        """Tell of programs that publish on the rack's topics and have not turned out to be processes of it."""
+        """Report programs that publish on the rack's topics but are not processes of the rack."""
         now = time.monotonic_ns()
         for stranger in self._strangers.values():
             if now - stranger.since_ns > GRACE_NS:
@@ -142,14 +140,14 @@ class RecordedRun:
                     )
 
     def keep(self, table: RawMessage) -> None:
-        """Keep a table that is not ours: it may turn out to be that of the rack's next run."""
+        """Keep the table of another program: it may be that of the rack's next run."""
         self._tables[participant(table.sender)] = table
         if len(self._tables) > MOST_TABLES:
             racks = self.racks()
             self._tables = {sender: kept for sender, kept in self._tables.items() if sender in racks}
 
     def successor(self) -> RawMessage | None:
-        """Return the table of the rack's next run once there is one: ours has gone, or is silent."""
+        """Return the table of the rack's next run, once the present one has left the graph or is silent."""
         now = time.monotonic_ns()
         if not self._tables or now < self._next_ns:
             return None

@@ -1,14 +1,13 @@
 """The node ``recorder``: records a rack that runs in another process, over DDS.
 
 Subscribes to the rack's ``variables``, ``config``, ``backplane``, ``backplane/snapshot``, ``scans``, ``states`` and to
-the topics of all common variables; publishes nothing. Messages are taken as bytes, in a look at all topics every 25 ms:
-that costs a fraction of one callback each, and one look says how far the topics have come. Each message brings the
-time at which it was sent, which is the order of the rack's own log.
+the topics of all common variables; publishes nothing. Messages are taken as bytes, by polling all topics every 25 ms:
+that costs a fraction of one callback each, and one poll shows how far all topics have come. Each message carries the
+time at which it was sent, which gives the order of the rack's own log.
 
-Whether a recorder hears all that this process of a distributed rack is going to send.
-
-Its subscriptions are looked for in the graph: a reliable writer that has met a reader before its first message sends it
-all of them, or sends them again.
+``RecorderWait`` waits, in a process of a distributed rack, for a recorder that will receive all of its messages. It
+looks for the recorder's subscriptions in the graph: a reliable writer that is matched with a reader before its first
+message delivers all messages to it.
 """
 
 from __future__ import annotations
@@ -45,14 +44,14 @@ from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.process import joined_context
 
 _LOOK_NS = 100 * NS_PER_MS
-"""Time between two looks (decision): the graph is asked for each topic."""
+"""Time between two checks (decision): the graph is queried for each topic."""
 
 
 class RecorderWait:
-    """Looks for the recorder of one process."""
+    """Checks whether a recorder has subscribed to the topics of one process."""
 
     def __init__(self, site: RackContext, node: ModuleNode, *others: str) -> None:
-        """Look for readers of what the stream of this process sends, and of ``others``, topics of the rack."""
+        """Check the topics that the stream of this process publishes, and ``others``, topics of the rack."""
         self._node = node
         self._space, self._name = f"/{site.rack.config.namespace}", recorder_name(site.arguments)
         recorded = LiveTopics.expected(self._space, site.rack.config).all
@@ -61,7 +60,7 @@ class RecorderWait:
         self._next_ns = 0
 
     def is_over(self) -> bool:
-        """Return whether the recorder hears all of it."""
+        """Return whether the recorder has subscribed to all of them."""
         now = time.monotonic_ns()
         if self._unheard and now >= self._next_ns:
             self._next_ns = now + _LOOK_NS
@@ -74,26 +73,26 @@ class RecorderWait:
 
 
 LOOK_S = 0.025
-"""Time between two looks at the topics."""
+"""Seconds between two polls of the topics."""
 HOLD_NS = 250 * NS_PER_MS
-"""How long a message waits for those that were sent before it and came later."""
+"""How long a message is held for those that were sent before it and arrive later."""
 MOST_BYTES = 64 << 20
 """Longest message that is read (decision: an image of the largest rack is a fraction of it)."""
 READER_DEPTH = 10_000
 """Messages of one topic that wait in this process when it is held up."""
 FILES_WAIT_NS = 3 * NS_PER_S
-"""How long a rack's files are waited for once its table has come."""
+"""How long to wait for a rack's files once its table has arrived."""
 _KNOCK_NS = NS_PER_S
 _SLOW_KNOCK_NS = 10 * _KNOCK_NS
 _MOST_KNOCKS = 5
-"""How often it asks each second; then it asks each ten seconds."""
+"""Number of requests at intervals of one second; later ones are sent every ten seconds."""
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _FILES = TopicKind("std_msgs/msg/String", LATCHED)
 _PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
 
 
 class SeveralRacks(UserError):
-    """Several racks have one name in this ROS domain."""
+    """Several racks have the same name in this ROS domain."""
 
 
 def recorder_name(arguments: RosArguments) -> str:
@@ -119,7 +118,7 @@ class RawSubscription:
         self._taker = taker_of(self._subscription, MOST_BYTES)
 
     def taken(self) -> Iterator[RawMessage]:
-        """Return the messages that have come; one that is longer than any of a rack's has no bytes."""
+        """Yield the messages received; one longer than ``MOST_BYTES`` has no payload."""
         while (found := self._taker.take()) is not None:
             yield found
 
@@ -129,7 +128,7 @@ class RawSubscription:
 
 
 class RecorderNode(Node):  # type: ignore[misc]
-    """The node in the graph; it has no services, for nothing spins it."""
+    """The recorder's node; it has no services, because nothing spins it."""
 
     def __init__(self, space: str, context: Context, name: str = "recorder") -> None:
         quiet = [Parameter("start_type_description_service", value=False)]
@@ -143,14 +142,14 @@ class RecorderNode(Node):  # type: ignore[misc]
         )
 
     def racks(self) -> list[str]:
-        """Return the namespaces of the racks that are there, such as ``/pm1``."""
+        """Return the namespaces of the racks in the graph, such as ``/pm1``."""
         tables = [name for name, types in self.get_topic_names_and_types() if _TABLE_TYPE in types]
         spaces = [name.removesuffix("/variables") for name in tables if self.count_publishers(name)]
         return sorted(space for space in spaces if f"{space}/variables" in tables)
 
 
 class LiveRecorder:
-    """Finds a rack and records it; ``close`` in any case.
+    """Finds a rack and records it; always call ``close``.
 
     ``recording`` is None until ``open``.
 
@@ -182,7 +181,7 @@ class LiveRecorder:
         self._run_id = 0
 
     def racks(self) -> list[str]:
-        """Return the namespaces of the racks that are there."""
+        """Return the namespaces of the racks in the graph."""
         return self._node.racks()
 
     @property
@@ -191,9 +190,9 @@ class LiveRecorder:
         return self.binding.is_there
 
     def expect(self, config: RackConfig) -> None:
-        """Hear a rack that need not be there yet, so that nothing of its beginning is lost.
+        """Subscribe to a rack that may not exist yet, so that its first messages are not lost.
 
-        What it sends waits until ``open``, ``READER_DEPTH`` messages of each topic.
+        They wait until ``open``, ``READER_DEPTH`` messages of each topic.
         """
         topics = LiveTopics.expected(self._space, config)
         kinds = topics.all
@@ -202,10 +201,10 @@ class LiveRecorder:
         self._early = {name: RawSubscription(self._node, name, kinds[name]) for name in topics.in_order}
 
     def find(self, wait_ns: int, stopping: Callable[[], bool]) -> VariableTable | None:
-        """Wait for the rack's table; None if it does not come. From then on only that rack's messages count.
+        """Wait for the rack's table; return None if it does not arrive. Then only that rack's messages are recorded.
 
         Raises:
-            CdrError: what comes is not a table.
+            CdrError: the message is not a table.
             SeveralRacks: several racks have this name.
         """
         topic = self._topics.variables
@@ -241,10 +240,10 @@ class LiveRecorder:
             self._presences = RawSubscription(self._node, f"{self._space}/bus/presence", _PRESENCE)
 
     def files(self, stopping: Callable[[], bool]) -> list[RackFile]:
-        """Return the files that the rack runs from; none if it does not offer them.
+        """Return the files that the rack runs from; an empty list if it does not publish them.
 
         Raises:
-            RackFilesError: what it sends are none.
+            RackFilesError: the message does not hold files.
         """
         if self._files is None:
             self._files = RawSubscription(self._node, self._topics.config, _FILES)
@@ -264,7 +263,7 @@ class LiveRecorder:
         storage: StorageOptions,
         split_ns: int = 0,
     ) -> LiveRecording:
-        """Create the bag and subscribe; messages come with ``step``. ``split_ns`` is that of ``LiveRecording``.
+        """Create the bag and subscribe; ``step`` records messages. ``split_ns`` is that of ``LiveRecording``.
 
         Raises:
             RecordingError: the folder exists already or cannot be written.
@@ -284,7 +283,7 @@ class LiveRecorder:
         return self.recording
 
     def step(self) -> None:
-        """Take what has come and record what is due."""
+        """Take the messages received and record those that are due."""
         assert self.recording is not None
         now = time.monotonic_ns()
         self._look()
@@ -301,7 +300,7 @@ class LiveRecorder:
             self._request_image(now)
 
     def finish(self) -> None:
-        """Take and record what is still there, and finish the bag; a disk that refuses is the recording's failure."""
+        """Take and record the remaining messages, and finish the bag; a disk error is the recording's failure."""
         if self.recording is None:
             return
         self._look()
@@ -329,7 +328,7 @@ class LiveRecorder:
                 self._order.add(found.sent_ns, (topic, found.payload or b""))
 
     def _ours(self, subscription: RawSubscription) -> Iterator[RawMessage]:
-        """Return what has come from the rack."""
+        """Yield the messages received from the rack."""
         topic, binding = subscription.topic, self.binding
         for found in subscription.taken():
             if binding.is_ours(topic, found):
@@ -338,7 +337,7 @@ class LiveRecorder:
                 binding.keep(found)
 
     def _meet_processes(self) -> None:
-        """Learn which participants are the processes of a rack that is cut into several."""
+        """Find the participants that are processes of a distributed rack."""
         if self._presences is None:
             return
         for found in self._presences.taken():
@@ -348,7 +347,7 @@ class LiveRecorder:
                     self.binding.admit(found.sender)
 
     def _look_at_files(self) -> None:
-        """Store the source of a task that was reloaded meanwhile: the rack tells its files again then."""
+        """Store the source of a task that was reloaded meanwhile: the rack publishes its files again then."""
         assert self._files is not None
         assert self.recording is not None
         for found in self._ours(self._files):
@@ -358,7 +357,7 @@ class LiveRecorder:
                 self.recording.notes.append(f"left out what {self._topics.config} told: {error}")
 
     def _count_lost(self, topic: str, number: int) -> None:
-        """Count values of a common that did not come: the sender keeps one of them only."""
+        """Count lost values of a common: the publisher keeps only one of them."""
         before = self._numbers.get(topic, 0)
         if before and number > before + 1:
             self.lost_values[topic] += number - before - 1
@@ -366,7 +365,7 @@ class LiveRecorder:
             self._numbers[topic] = number
 
     def _request_image(self, now: int) -> None:
-        """Ask the rack for what recording waits for: it answers a further reader as it answered the first."""
+        """Request the data that recording still needs; the rack sends it again to every new subscriber."""
         assert self.recording is not None
         for knock in self._knocks:
             knock.close()
@@ -383,10 +382,10 @@ class LiveRecorder:
 
 
 def _files(payload: bytes) -> list[RackFile]:
-    """Return the files that a rack offers.
+    """Return the files in a message of the topic ``config``.
 
     Raises:
-        RackFilesError: it is not what a rack sends.
+        RackFilesError: the message does not hold files.
     """
     try:
         return files_from_text(str(decode("std_msgs/msg/String", payload)[0]))
@@ -395,4 +394,4 @@ def _files(payload: bytes) -> list[RackFile]:
 
 
 def _nothing(_: Any) -> None:
-    """Stand in for a callback: messages are taken by looking."""
+    """Do nothing: messages are polled."""

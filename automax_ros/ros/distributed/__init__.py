@@ -1,1 +1,1 @@
-"""A rack in several processes: its bus, who is there, requests passed on."""
+"""A rack in several processes: its bus, the presence of its processes, forwarded requests."""

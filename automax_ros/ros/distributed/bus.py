@@ -1,11 +1,11 @@
-"""The bus of a distributed rack: what the processes of one rack tell each other in the graph.
+"""The bus of a distributed rack: topics that the processes of one rack exchange.
 
-Each process publishes and hears ``bus`` (automax_msgs/BusWrite: its writes to common memory), ``bus/image``
-(automax_msgs/BusImage: all it holds, for one that asks) and ``bus/presence`` (automax_msgs/Presence each 20 ms, with
-liveliness by hand). The processes find each other by these topics in the rack's namespace; the home, where common
-memory is, gives the start when all are there. What is not of this run is refused and counted.
+Each process publishes and subscribes to ``bus`` (automax_msgs/BusWrite: its writes to common memory), ``bus/image``
+(automax_msgs/BusImage: the memory it holds, on request) and ``bus/presence`` (automax_msgs/Presence every 20 ms, with
+manual liveliness). The processes find each other by these topics in the rack's namespace; the home, the process with
+common memory, sets the start when all are present. Messages of other runs are rejected and counted.
 
-``begin`` is called when the start is known; before it nothing is written to the rack.
+``begin`` is called when the start is known; before that nothing is written to the rack.
 """
 
 from __future__ import annotations
@@ -53,24 +53,24 @@ from automax_ros.ros.distributed.process_watch import ProcessWatch, this_host
 from automax_ros.runtime.health import FROM_STRANGERS
 
 LEASE_NS = 100 * NS_PER_MS
-"""Liveliness of a process's presence, for whoever looks from outside."""
+"""Liveliness lease of a process's presence, for observers outside the rack."""
 ALONE_NS = 3500 * NS_PER_MS
-"""A home that was not told of a run begins one when it has seen nobody for so long: discovery takes up to 3 s."""
+"""A home without a run begins one after seeing no other process for this long: discovery takes up to 3 s."""
 LEAD_NS = 400 * NS_PER_MS
-"""The start lies so far ahead of the moment at which all are there, so that all hear of it before."""
+"""Time from the moment at which all processes are present to the start, so that all learn of it before."""
 ANSWER_NS = 100 * NS_PER_MS
-"""The same process gets an image at most this often."""
+"""An image is sent to the same process at most this often."""
 MOST_BYTES = 64 << 20
-"""Longest image that is read; writes and presences may be a hundredth of it."""
+"""Longest image that is read; writes and presences may have a hundredth of it."""
 BATCHES_A_ROUND = 32
-"""Most batches that the door takes at a time: seven processes send 1000 in a second, and on a busy host it is late."""
+"""Most batches that the intake takes per round: seven processes send 1000 per second, and on a busy host it is late."""
 BATCHES_FIRST = 64
-"""Most batches that are taken because a process's word tells of some that have not come."""
+"""Most batches that are taken when a presence announces batches that have not arrived."""
 MODULE_LOST = "31"
 """The hardware's code when a module does not answer on the backplane: bus error (decision: so is one that is lost)."""
 PRESENCE = "bus/presence"
 FOR_ALL = 0
-"""Asked by nobody: an image of what a process that was lost has written last, which some may not have."""
+"""``asked_by`` of an unrequested image: the last writes of a lost process, which some processes may not have."""
 
 
 class ProcessAlreadyRuns(UserError):
@@ -79,12 +79,12 @@ class ProcessAlreadyRuns(UserError):
 
 @dataclass(frozen=True)
 class ProcessLayout:
-    """How a rack is cut into processes.
+    """How a rack is divided into processes.
 
-    ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the one that is there. ``is_common``
-    says whether what happens now happens in every process by itself, as stimuli do. ``start_delay_ns``: so far the
-    start lies ahead of the moment at which all are there, as the home says it. ``awaits_recorder``: it waits for
-    one that hears this process.
+    ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the present one. ``is_common`` returns
+    whether the current action happens in every process independently, as stimuli do. ``start_delay_ns`` is the time
+    from the moment at which all are present to the start; that of the home counts. ``awaits_recorder``: wait for a
+    recorder that has subscribed to this process.
     """
 
     seats: Sequence[tuple[int, ...]]
@@ -95,9 +95,9 @@ class ProcessLayout:
 
 
 class DistributedMemory:
-    """The bus as one process has it. ``fault`` is why the process cannot take part, if it cannot.
+    """One process's connection to the bus. ``fault`` is the reason why the process cannot take part, else None.
 
-    ``seats`` are the slots of all processes by the slot that names each, ``plants`` the slots whose drives turn them.
+    ``seats`` are the slots of all processes by the slot that names each; ``plants`` are those of the plants' drives.
     """
 
     def __init__(self, site: RackContext, node: ModuleNode, seating: ProcessLayout) -> None:
@@ -140,17 +140,17 @@ class DistributedMemory:
 
     @property
     def run_id(self) -> int:
-        """The number of the run, 0 while none is known."""
+        """The number of the run, 0 while it is unknown."""
         return self.peers.run_id
 
     @property
     def epoch_ns(self) -> int:
-        """The wall clock at rack time 0, ns; 0 while the start is not known."""
+        """The wall clock at rack time 0, ns; 0 while the start is unknown."""
         return self.peers.epoch_ns if self.stage is Stage.RUNNING else 0
 
     @property
     def missing(self) -> list[str]:
-        """The processes that are not there, by their first modules; with all of them, the recorder that is awaited."""
+        """The absent processes, by their first modules; if all are present, the recorder that is awaited."""
         there = {*self.peers.by_seat, self.peers.seat}
         found = [part_name(self._rack.config, slots) for seat, slots in self.seats.items() if seat not in there]
         return found or ([] if self._recorder is None else ["the recorder"])
@@ -161,7 +161,7 @@ class DistributedMemory:
         return [part_name(self._rack.config, self.seats[seat]) for seat in sorted(self.peers.lost & set(self.seats))]
 
     def begin(self) -> None:
-        """Take up what has come before the start: to be called as soon as the rack was started."""
+        """Apply the messages received before the start; call it as soon as the rack was started."""
         self.link.starting = False
         self._begun = True
         waiting, self._waiting = self._waiting, []
@@ -169,7 +169,7 @@ class DistributedMemory:
             take()
 
     def catch_up(self) -> None:
-        """Take over the image and the standing of a rack that runs: between presets and the start of tasks."""
+        """Apply the image and the operating state of a running rack; call it between presets and the start of tasks."""
         waiting, self._waiting = self._waiting, []
         for take in waiting:
             take()
@@ -177,13 +177,13 @@ class DistributedMemory:
             self.link.adopt(standing_of(peer.presence))
 
     def leave(self) -> None:
-        """Tell the others that this process ends in order."""
+        """Announce that this process ends normally."""
         self.link.take_waiting()
         self.stage = Stage.LEAVING
         self._guarded(self._tell)
         self._watch.close()
 
-    # what goes out
+    # outgoing messages
 
     def _send(self, batch: Batch) -> None:
         self._writes.publish(encode(write_message(batch, self.run_id, self.peers.process)))
@@ -218,7 +218,7 @@ class DistributedMemory:
         message = image_message(picture, self._rack.now_ns, self.run_id, self.peers.process, asked_by)
         self._images.publish(encode(message))
 
-    # the beat
+    # what each beat does
 
     def _beat(self) -> None:
         now = time.monotonic_ns()
@@ -255,9 +255,9 @@ class DistributedMemory:
                 self.stage = Stage.RUNNING
 
     def _asks(self) -> int:
-        """Return the process whose image is wanted, 0 for none."""
+        """Return the process to request an image from, 0 for none."""
         running = next(self.peers.running(), None)
-        # One that is ready, but heard of the start when it was over, joins as one that comes later does.
+        # A process that is ready, but learned of the start too late, joins as a later one does.
         if self.stage in (Stage.JOINING, Stage.READY) and running is not None and not self._has_image:
             return running.process
         owing = self.peers.owing() if self._begun else None
@@ -277,7 +277,7 @@ class DistributedMemory:
         if stops and self._begun and operations.powered and operations.stopped is None:
             operations.stop_all(text, MODULE_LOST)
 
-    # what comes in
+    # incoming messages
 
     def _hear(
         self, topic: str, qos: QoSProfile, kind: Any, receive: Callable[[Any, bytes], None], terms: Terms
@@ -325,13 +325,13 @@ class DistributedMemory:
         self._when_begun(lambda: self.link.merge(picture))
 
     def _latest_ns(self, told_epoch_ns: int = 0) -> int:
-        """Return the latest rack time that another process can tell of."""
+        """Return the latest rack time that a message of another process can have."""
         epoch_ns = self.peers.epoch_ns or told_epoch_ns
         passed_ns = time.time_ns() - epoch_ns if epoch_ns else LONGEST_RUN_NS
         return max(self._rack.now_ns, passed_ns) + AHEAD_NS
 
     def _peer(self, message: BusWrite | BusImage, sender: bytes) -> Peer | None:
-        """Return the process that a message says it is of; None where that is not of this run, or not its sender."""
+        """Return the process that a message names; None if it is not of this run, or not the sender."""
         if message.run_id != self.run_id or self._participants.get(message.process, sender) != sender:
             return None
         return self.peers.of(message.process)
@@ -359,9 +359,9 @@ class DistributedMemory:
             self.link.adopt(standing_of(presence))
 
     def _look_for_missing(self, presence: Presence) -> None:
-        """Take what waits on the bus before batches of which a process has told count as missing.
+        """Take the batches that wait on the bus, before those that a presence announced count as missing.
 
-        Where the host is busy they wait here: an image asked for each time would make it busier.
+        On a busy host they only wait here, and requesting an image each time would make it busier.
         """
         with self._site.lock:
             is_short = self.peers.is_short(presence)

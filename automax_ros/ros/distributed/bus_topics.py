@@ -1,4 +1,4 @@
-"""How a message of the bus comes in: through the rack's door, judged by its length and its sender's participant."""
+"""Subscriptions to the bus: read by the message intake, with a length limit and the sender's participant."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from automax_ros.ros.intake.raw_messages import taker_of
 from automax_ros.ros.intake.rcl import library
 
 PARTICIPANT_BYTES = 12
-"""The part of a publisher's GID that all of one process share."""
+"""Length of the part of a GID that all publishers of one process share."""
 Receive = Callable[[Any, bytes], None]
-"""Gets a decoded message and its sender's participant, b"" where that is not known; in the rack's present."""
+"""Called between two scans with a decoded message and its sender's participant, b"" if unknown."""
 
 
 @dataclass(frozen=True)
 class Terms:
-    """How a topic of the bus is taken.
+    """How a topic of the bus is read.
 
-    ``most_bytes``: longer messages are refused. ``share``: most in a round of the door, 0 for what any topic has.
-    ``then`` gets each message after it was received, outside the rack: scans may come before.
+    ``most_bytes``: longer messages are refused. ``share``: most messages per round of the intake, 0 for the common
+    limit. ``then`` is called with each message after it was received, without the rack's lock: scans may come first.
     """
 
     most_bytes: int
@@ -34,7 +34,7 @@ class Terms:
 
 
 class BusTopic:
-    """One topic of the bus. ``refuse`` is told what is not a message of it, or too long."""
+    """One topic of the bus. ``refuse`` is called for messages that are malformed or too long."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class BusTopic:
         refuse: Callable[[str, str], None],
         terms: Terms,
     ) -> None:
-        """Subscribe, and be served at the rack's door."""
+        """Subscribe, and register at the message intake."""
         subscription = node.own_subscription(message_class(type_name), topic, qos)
         self.name, self.handle = subscription.topic_name, subscription.handle
         self._topic, self._type_name, self._then = topic, type_name, terms.then
@@ -55,7 +55,7 @@ class BusTopic:
         node.site.door.add(self, share=terms.share)
 
     def take(self) -> bool:
-        """Take the next message; False where there is none."""
+        """Take the next message; return False if there is none."""
         taken = self._taker.take()
         if taken is None:
             return False
@@ -73,7 +73,7 @@ class BusTopic:
         return True
 
     def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Let rcl call a function for each message."""
+        """Set the C function that rcl calls for each message."""
         rcl = library()
         assert rcl is not None
         return int(rcl.on_message(pointer, callback, data))

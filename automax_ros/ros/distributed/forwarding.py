@@ -1,8 +1,8 @@
-"""Passes an operator's requests on to the processes of a distributed rack that hold what they are about.
+"""Forwards an operator's requests to the processes of a distributed rack that have the objects concerned.
 
-The operator asks in the process of common memory, as if the rack were in one piece. Each other process serves the same
-services under its first node, ``processor_3/operate/run``; ``RequestForwarder`` finds whom a request concerns, asks
-them all at once and answers when all have answered, or after ``ANSWER_S``.
+The operator calls the process with common memory, as if the rack were in one process. Each other process has the same
+services under its first node, ``processor_3/operate/run``; ``RequestForwarder`` finds the processes that a request
+concerns, calls them all at once and responds when all have answered, or after ``ANSWER_S``.
 """
 
 from __future__ import annotations
@@ -21,40 +21,40 @@ from automax_ros.ros.distributed.bus import DistributedMemory
 from automax_ros.ros.intake.service_requests import DeferredResponse, Respond
 
 ANSWER_S = 2.0
-"""How long another process is waited for."""
+"""Seconds to wait for another process."""
 FIND_S = 0.02
-"""How often a service that is not known yet is looked for."""
+"""Seconds between two checks for a service that is not discovered yet."""
 RELOAD_ANSWER_S = 60.0
-"""The same where it has to compile."""
+"""Seconds to wait for another process that has to compile."""
 THIS_PROCESS = -1
 """This process, among those that a request concerns."""
 NOT_TOGETHER = "a rack of several processes keeps the wall clock: it cannot be halted or stepped"
-"""Why some requests are refused (decision)."""
+"""Why requests to halt or step a distributed rack are refused (decision)."""
 Local = Callable[[Any, Any], Any]
-"""Carries out a request in this process and returns the response."""
+"""Executes a request in this process and returns the response."""
 
 
 def operate_name(module: str, service: str) -> str:
-    """Return the service, in the rack's namespace, by which a process carries out what another was asked for."""
+    """Return the service, in the rack's namespace, by which a process executes forwarded requests."""
     return f"{module}/operate/{service}"
 
 
 @dataclass(frozen=True)
 class Target:
-    """What one process is asked: its seat, ``THIS_PROCESS`` for this one, and the request."""
+    """A request to one process: its seat, ``THIS_PROCESS`` for this one, and the request."""
 
     seat: int
     request: Any
 
 
 class RequestForwarder:
-    """Forwards the requests of one node, that of the operator. ``bus`` knows who is there.
+    """Forwards the requests of the operator's node. ``bus`` knows which processes are present.
 
-    ``reloaded`` is called when the source of a task elsewhere is another.
+    ``reloaded`` is called when a task of another process has a new source.
     """
 
     def __init__(self, node: ModuleNode, bus: DistributedMemory, reloaded: Callable[[], None]) -> None:
-        """Find out which process holds what."""
+        """Find the process of each task, slot and plant."""
         self._reloaded = reloaded
         config = node.site.rack.config
         self._node, self._bus, self._config = node, bus, config
@@ -67,7 +67,7 @@ class RequestForwarder:
         self._clients: dict[tuple[int, str], Any] = {}
 
     def answer(self, service: str, kind: Any, request: Any, response: Any, local: Local) -> Any:
-        """Answer a request: at once where it concerns this process alone, else when all concerned have answered."""
+        """Answer a request: at once if it concerns this process alone, else when all processes have answered."""
         if service in _NOT_TOGETHER:
             return _refused(response, NOT_TOGETHER)
         shares = _SHARING.get(service, _mine)(self, request, kind)
@@ -96,7 +96,7 @@ class RequestForwarder:
         return DeferredResponse(begin)
 
     def _note_source(self, request: Any) -> None:
-        """Keep what a task elsewhere runs from now on: whoever records the rack asks here for its files."""
+        """Store the new source of a task of another process: recorders get the rack's files from this one."""
         name = request.task.strip().upper()
         sources = self._node.site.rack.operations.installation.sources
         sources[name] = SourceText(sources[name].name, request.source)
@@ -112,15 +112,15 @@ class RequestForwarder:
 
     @property
     def node(self) -> ModuleNode:
-        """The node that asks."""
+        """The node that sends the requests."""
         return self._node
 
     def is_there(self, seat: int) -> bool:
-        """Return whether a process lives."""
+        """Return whether a process is present."""
         return seat in self._bus.peers.by_seat
 
     def seat_of_task(self, text: str) -> int:
-        """Return the process that runs a task; this one for a name that the rack does not have, to say so."""
+        """Return the process that runs a task; for an unknown name this one, which refuses it."""
         return self._tasks.get(text.strip().upper(), THIS_PROCESS)
 
     def seat_of_name(self, text: str) -> int:
@@ -137,7 +137,7 @@ class RequestForwarder:
         return self._slots.get(str(self._plants.get(text.strip().upper(), "")), THIS_PROCESS)
 
     def everybody(self, request: Any) -> list[Target]:
-        """Return a request for all processes."""
+        """Return the targets of a request to all processes."""
         return [Target(THIS_PROCESS, request), *(Target(seat, request) for seat in self._seats)]
 
     def _name(self, seat: int) -> str:
@@ -145,9 +145,9 @@ class RequestForwarder:
 
 
 class _PendingRequest:
-    """One request on its way: waits for all answers, at most a time.
+    """A forwarded request: waits for all answers, up to a time limit.
 
-    A process is asked once its service is known here: DDS drops a request that is sent before.
+    A process is called once its service is discovered: DDS drops a request that is sent before.
     """
 
     def __init__(
@@ -175,7 +175,7 @@ class _PendingRequest:
             self._end()
 
     def _ask(self) -> None:
-        """Ask the processes whose service is known by now."""
+        """Call the processes whose service is discovered by now."""
         waiting, self._unasked = self._unasked, []
         for share, client in waiting:
             if client.service_is_ready():
@@ -193,7 +193,7 @@ class _PendingRequest:
                     self._end()
 
     def _end(self) -> None:
-        """Answer with what has come."""
+        """Respond with the answers received."""
         timers, self._timers = self._timers, []
         if timers:
             for timer in timers:
@@ -205,10 +205,10 @@ class _PendingRequest:
 def _merged(
     response: Any, request: Any, shares: Sequence[Target], answers: dict[int, Any], silent: Sequence[str]
 ) -> Any:
-    """Return one response: all lists one after the other, numbers of tasks added up, OK if all are.
+    """Return one response: lists concatenated, numbers of tasks added up, OK if all are.
 
-    A common that is forced is so in every process, and told once. Where processes are ``silent``, a response that can
-    name them (``absent``) holds what has come; any other is refused.
+    A common that is forced is forced in every process, and listed once. If processes are ``silent``, a response that
+    can name them (``absent``) holds the answers received; any other is a refusal.
     """
     found = [answer for answer in answers.values() if answer is not None]
     if len(shares) == 1 and found:
@@ -236,9 +236,9 @@ def _merged(
 
 
 def _in_order(response: Any, names: list[str]) -> None:
-    """Put what was read into the order in which it was asked for, each once."""
+    """Sort the values into the order in which they were requested, each once."""
     places = {name.strip().upper(): place for place, name in reversed(list(enumerate(names)))}
-    # A stranger may answer with fewer values than names.
+    # A foreign program may answer with fewer values than names.
     read = {item[0]: item for item in zip(response.found, response.values, response.shown, strict=False)}
     items = sorted(read.values(), key=lambda item: places.get(item[0].upper(), len(places)))
     response.found, response.values, response.shown = ([item[column] for item in items] for column in range(3))
@@ -268,7 +268,7 @@ def _mine(_: RequestForwarder, request: Any, __: Any) -> list[Target]:
 
 
 def _by_task(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
-    """An empty name is all tasks."""
+    """Return the process of a task; an empty name means all tasks."""
     if not request.task.strip():
         return forwarding.everybody(request)
     return [Target(forwarding.seat_of_task(request.task), request)]
@@ -279,7 +279,7 @@ def _by_name(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]
 
 
 def _by_names(forwarding: RequestForwarder, request: Any, kind: Any) -> list[Target]:
-    """Without names it is everything, wherever it is."""
+    """Return the processes of names; without names all processes are meant."""
     if not request.names:
         return forwarding.everybody(request)
     groups: dict[int, list[str]] = {}
@@ -305,7 +305,7 @@ def _status(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
 
 
 _ADDED = ("tasks", "running", "ended")
-"""Numbers of a status that are those of one process each."""
+"""Fields of a status that count for one process and are added up."""
 _NOT_TOGETHER = ("pause", "resume", "step")
 _SHARING: dict[str, Callable[[RequestForwarder, Any, Any], list[Target]]] = {
     "run": _by_task,
@@ -327,4 +327,4 @@ _SHARING: dict[str, Callable[[RequestForwarder, Any, Any], list[Target]]] = {
     "tasks": _everybody,
     "status": _status,
 }
-"""Whom the requests of each service concern; the others are for common memory alone."""
+"""Returns the processes that a request concerns, by service; all other services concern common memory alone."""

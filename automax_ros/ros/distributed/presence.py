@@ -1,7 +1,7 @@
-"""A rack in one process says in the graph that it is there, and hears of others with its name.
+"""Publishes the presence of a single-process rack and detects other racks of the same name.
 
-Two racks of one name, each started where the other's lock cannot be seen, mix up whoever listens to them: each says so,
-in a line and in its diagnostics. Racks in many processes do the same over their bus (``ros/distributed/bus``).
+Two racks of one name, each started where the other's lock cannot be seen, confuse their subscribers: each reports it,
+in a line and in its diagnostics. Distributed racks do the same over their bus (``ros/distributed/bus``).
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from automax_ros.ros.distributed.bus_topics import BusTopic, Terms
 from automax_ros.runtime.health import FROM_STRANGERS
 
 PERIOD_NS = NS_PER_S
-"""How often a rack in one process says that it is there (decision): nobody waits for it."""
+"""Period of the presence of a single-process rack (decision): no program waits for it."""
 _MOST_BYTES = 1 << 16
 
 
 class PresencePublisher:
-    """Speaks for a rack that is whole in this process."""
+    """Publishes the presence of a rack that is whole in this process."""
 
     def __init__(self, site: RackContext, node: ModuleNode) -> None:
-        """Join the graph; the first word comes after a second."""
+        """Create publisher and subscription; the first presence is published after a second."""
         self._site, self._process = site, int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._publisher = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
         kind, terms = "automax_msgs/msg/Presence", Terms(_MOST_BYTES)

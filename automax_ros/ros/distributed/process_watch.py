@@ -1,4 +1,4 @@
-"""Whether other processes of this host still live, by the kernel's word: at once, and without a mistake under load."""
+"""Asks the kernel whether other processes of this host still live: immediate, and reliable under load."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PIDS = Path("/proc/self/ns/pid")
 
 @cache
 def this_host() -> str:
-    """Return a word for this host, and the numbers of processes as they are counted here; "" where none is known."""
+    """Return an identifier of this host and of its namespace of process numbers; "" if unknown."""
     try:
         return f"{_BOOT.read_text(encoding='ascii').strip()} {_PIDS.readlink()}"
     except OSError:
@@ -23,14 +23,14 @@ def this_host() -> str:
 
 
 class ProcessWatch:
-    """Watches processes that have said who they are. ``close`` in any case."""
+    """Watches processes that have announced themselves. Always call ``close``."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Create it without processes."""
         self._files: dict[int, int] = {}
 
     def lives(self, presence: Presence) -> bool | None:
-        """Return whether a process lives, None where that cannot be known here: it is on another host."""
+        """Return whether a process lives; None if that cannot be known here, as on another host."""
         if not this_host() or presence.host != this_host() or not hasattr(os, "pidfd_open"):
             return None
         if presence.process not in self._files:
@@ -45,11 +45,11 @@ class ProcessWatch:
         return not poll.poll(0)
 
     def forget(self, process: int) -> None:
-        """Watch a process no longer."""
+        """Stop watching a process."""
         if process in self._files:
             os.close(self._files.pop(process))
 
     def close(self) -> None:
-        """Watch nobody any more."""
+        """Stop watching all processes."""
         for process in list(self._files):
             self.forget(process)

@@ -1,1 +1,1 @@
-"""Messages and requests that come in: bounded, read without the interpreter, between two scans."""
+"""Incoming messages and requests: bounded, read without holding the interpreter, between two scans."""

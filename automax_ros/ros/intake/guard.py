@@ -1,9 +1,7 @@
-"""What keeps a client's message or request from ending a program.
+"""Keeps a client's message or request from ending a program, and limits repeated log messages.
 
-rclpy lets an exception of any callback leave ``spin_once``, those of its own services and conversions included: a
-``ParameterValue`` of an unknown type is enough, or a string that is not UTF-8. After a guard the program goes on.
-
-Lets a repeated message through from time to time.
+rclpy raises an exception of any callback from ``spin_once``, those of its own services and conversions included: a
+``ParameterValue`` of an unknown type is enough, or a string that is not UTF-8. With a guard the program continues.
 """
 
 from __future__ import annotations
@@ -21,18 +19,18 @@ from automax_ros.runtime.health import Health
 
 
 class Throttle:
-    """Passes at most once in ``interval_s`` seconds of the wall clock.
+    """Passes at most once per ``interval_s`` seconds of the wall clock.
 
-    rclpy's own throttle goes by the place in the code: one variable's or task's messages would hide another's.
+    rclpy's own throttle works per line of code: messages of one variable or task would suppress those of another.
     """
 
     def __init__(self, interval_s: float) -> None:
-        """Begin ready to pass."""
+        """Create it ready to pass."""
         self._interval_s = interval_s
         self._next_s = 0.0
 
     def passes(self) -> bool:
-        """Return whether it is time again."""
+        """Return whether the interval is over; if so, the next one begins."""
         now = time.monotonic()
         if now < self._next_s:
             return False
@@ -41,43 +39,43 @@ class Throttle:
 
 
 FAILED, REFUSED = "failed callback", "refused request"
-"""What ``Health`` counts them as."""
+"""Names under which ``Health`` counts them."""
 MOST_TOLD, MOST_LOGGED = 300, 20
-"""Most characters of an error, and most failures, that are logged: a client may go on and on."""
+"""Most characters of an error, and most failures, that are logged: a client may repeat a bad request forever."""
 _LAST_TYPE = ParameterType.PARAMETER_STRING_ARRAY
 
 
 class RequestGuard:
-    """Reports what fails to ``health``, and the first failures to ``log``."""
+    """Reports failures to ``health``, and the first ones to ``log``."""
 
     def __init__(self, health: Health, log: Callable[[str], object]) -> None:
-        """Begin to guard."""
+        """Store where failures are reported."""
         self._health, self._log = health, log
 
     def report(self, what: str, error: Exception) -> None:
-        """Count a failure and tell it."""
+        """Count a failure and log it."""
         text = f"{what}: {type(error).__name__}: {str(error)[:MOST_TOLD]}"
         self._health.note(FAILED, (what, type(error)), lambda: text)
         if self._health.counts[FAILED] <= MOST_LOGGED:
             self._log(text)
 
     def refused(self, what: str, reason: str, key: str) -> None:
-        """Count a request that was refused with a reason, and tell the first one of a key."""
+        """Count a refused request, and report the first one of each key with its reason."""
         self._health.note(REFUSED, key, lambda: f"a request was refused: {what}: {reason}")
 
     def services(self, node: Node) -> None:
-        """Let no exception leave the services that a node has now; a request that fails is refused."""
+        """Guard the services that a node has now: a request that fails is refused."""
         for service in node.services:
             self.service(service)
 
     def service(self, service: Any) -> None:
-        """Let no exception leave a service; a request that fails is refused."""
+        """Guard a service: a request that fails is refused."""
         service.callback = self._answering(service.callback, service.srv_type, service.srv_name)
 
     def refusal(self, name: str, kind: Any, error: Exception) -> Any:
-        """Report a request to the service ``name`` that failed or was not read, and return the response to it.
+        """Report a request to the service ``name`` that failed or was not read, and return its response.
 
-        A result that says so is one, however many parameters were to be set (decision: who asks looks at the first).
+        The response has one result, however many parameters were to be set (decision: who asks looks at the first).
         """
         self.report(f"a request to {name} was refused", error)
         reason = str(error)[:MOST_TOLD]
@@ -90,7 +88,7 @@ class RequestGuard:
         return response
 
     def serve(self, executor: Any, context: Context, seconds: float) -> None:
-        """Let an executor carry out what has come, or wait for it at most a time (s).
+        """Spin an executor once, waiting at most ``seconds`` for work, and report exceptions.
 
         Raises:
             Exception: what the executor raises once the context is shut down.

@@ -1,9 +1,9 @@
-"""The door of a rack: one thread through which messages and requests come in, a stated number at a time.
+"""Receives all messages and requests of a rack in one thread, a bounded number at a time.
 
-What comes waits in DDS, as many of each topic or service as its quality of service keeps; older ones are dropped there.
-The thread is woken by counters that DDS's own threads count up (no Python runs for a message that only waits), takes at
-most ``MOST_A_ROUND`` in turn, lets scans go first (``Turns``), and rests a millisecond. What comes is taken on a thread
-of its own, not by callbacks of an executor or by looks between scans (decision: EventsExecutor queues an event for each
+They wait in DDS, as many of each topic or service as its quality of service keeps; older ones are dropped there. The
+thread is woken by counters that DDS's own threads increment (no Python runs for a message that only waits), takes at
+most ``MOST_A_ROUND`` in turn, gives way to scans (``RackLock``), and rests a millisecond. A separate thread takes them,
+not callbacks of an executor or polling between scans (decision: EventsExecutor queues an event for each
 message without bound; a message of 10 MB holds up the thread that takes it for 10 to 70 ms; a look at a topic costs
 1.5 us, half a core with 300 topics each millisecond). All measured on two cores of a virtual machine (docs/ros.md).
 """
@@ -23,45 +23,45 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from automax_ros.ros.intake.rcl import library
 
 MOST_A_ROUND = 16
-"""Most messages and requests that are taken in a round, together ..."""
+"""Most messages and requests that are taken per round, in total."""
 MOST_OF_ONE = 4
-"""... and of one topic or service."""
+"""Most messages and requests of one topic or service that are taken per round."""
 MOST_ROUNDS_FIRST = 16
-"""Most rounds that the last entrance waits for the others (decision: a flood does not hold it up for long)."""
+"""Most rounds of other entrances before the last one is read (decision: a flood does not hold it up for long)."""
 REST_S = 0.001
-"""Rest after a round: so at most 16,000 are taken in a second (decision), and what has a share of its own."""
+"""Seconds of rest after a round: at most 16,000 messages are taken per second (decision), without those of shares."""
 _GROUPS = 64
-"""Counters; with more topics and services several share one (a process has 1024 descriptors or so)."""
+"""Number of counters; more topics and services share them (a process has 1024 descriptors or so)."""
 _PATIENCE_S = 0.2
 _LOOK_S = 0.002
-"""Time between two looks where nothing wakes the thread."""
+"""Seconds between two polls where nothing wakes the thread."""
 
 InvalidHandle: type[Exception] = rclpy_implementation.InvalidHandle
 
 
 class Entrance(Protocol):
-    """A topic's or service's way in."""
+    """A subscription or service that ``MessageIntake`` reads."""
 
     name: str
     handle: Any
-    """That of rclpy's subscription or service."""
+    """The handle of rclpy's subscription or service."""
 
     def take(self) -> bool:
-        """Take one message and deal with it; False where there is none.
+        """Take one message and process it; return False if there is none.
 
         Raises:
             InvalidHandle: it was destroyed.
         """
 
     def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Let rcl call a C function for what comes (or none); returns rcl's result."""
+        """Set the C function that rcl calls for each arrival (None for none); return rcl's result."""
 
 
 class MessageIntake:
-    """Takes what comes at the entrances, on a thread of its own between ``open`` and ``close``."""
+    """Takes messages and requests from its entrances, on a separate thread between ``open`` and ``close``."""
 
     def __init__(self, report: Callable[[str, Exception], None]) -> None:
-        """Nothing is taken yet; ``report`` is told what an entrance fails with."""
+        """Create it without a thread; ``report`` is called with exceptions of entrances."""
         self._report = report
         self._lock = threading.Lock()
         self._entrances: list[Entrance] = []
@@ -73,9 +73,9 @@ class MessageIntake:
         self._poll = select.epoll() if library() is not None else None
 
     def add(self, entrance: Entrance, *, last: bool = False, share: int = 0) -> None:
-        """Let an entrance be served; the ``last`` one, of which there is one, after what has come at all others.
+        """Register an entrance. The one registered with ``last=True`` is read after all others.
 
-        ``share``: most messages of it in a round, where that is its own and not a part of what others have.
+        ``share``: most of its messages per round, if it has its own limit and no part of the common one.
         """
         with self._lock:
             if share:
@@ -93,19 +93,19 @@ class MessageIntake:
             group.watch(entrance)
 
     def open(self) -> None:
-        """Begin to take; a second time this does nothing."""
+        """Start the thread; a second call does nothing."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="door", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; what is being dealt with is finished."""
+        """End the thread, after the message that is being processed."""
         self._closing = True
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
-        """Release the counters, once the nodes have left the graph: DDS counts in them as long as it has readers."""
+        """Release the counters, once the nodes have left the graph: DDS increments them as long as it has readers."""
         self.stop()
         with self._lock:
             for group in self._groups:
@@ -134,7 +134,7 @@ class MessageIntake:
                 last, rounds = self._some(self._last, 1)[1], 0
 
     def _woken(self, patience_s: float) -> list[Entrance]:
-        """Return where something may have come, after a wait if there is nothing."""
+        """Return the entrances that may have messages, after a wait if there are none."""
         if self._poll is None:
             time.sleep(_LOOK_S)
             with self._lock:
@@ -147,7 +147,7 @@ class MessageIntake:
             return [entrance for group in groups for entrance in group.rung()]
 
     def _round(self, ready: deque[Entrance]) -> None:
-        """Take from each in turn; one that may have more stays."""
+        """Take from each entrance in turn; one that may have more stays in the queue."""
         room = MOST_A_ROUND
         for _ in range(len(ready)):
             if not room or self._closing:
@@ -160,7 +160,7 @@ class MessageIntake:
                 ready.append(entrance)
 
     def _some(self, entrance: Entrance, most: int) -> tuple[int, bool]:
-        """Take at most this many; returns how many it were, and whether there may be more."""
+        """Take at most this many; return how many were taken, and whether there may be more."""
         for taken in range(most):
             try:
                 if not entrance.take():
@@ -183,14 +183,14 @@ class MessageIntake:
 
 
 class _Group:
-    """Some entrances with one counter."""
+    """Entrances that share one counter."""
 
     def __init__(self) -> None:
         self.counter = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self.entrances: list[Entrance] = []
 
     def watch(self, entrance: Entrance) -> None:
-        """Let what comes at an entrance be counted.
+        """Count the arrivals of an entrance.
 
         Raises:
             RuntimeError: the middleware refuses.
@@ -204,7 +204,7 @@ class _Group:
             raise RuntimeError(f"{entrance.name} cannot be watched: rcl returns {result}")
 
     def rung(self) -> list[Entrance]:
-        """Return the entrances; the counter is 0 then."""
+        """Reset the counter, and return the entrances unless it was 0."""
         try:
             os.eventfd_read(self.counter)
         except BlockingIOError:
@@ -212,7 +212,7 @@ class _Group:
         return list(self.entrances)
 
     def close(self) -> None:
-        """Close the counter; nothing counts in it any more."""
+        """Detach the entrances and close the counter."""
         rcl = library()
         assert rcl is not None
         for entrance in self.entrances:
@@ -221,5 +221,5 @@ class _Group:
                     entrance.wake(entrance.handle.pointer, None, None)
                     rcl.reset_error()
             except InvalidHandle:
-                continue  # destroyed: it counts no more
+                continue  # destroyed: it does not count any more
         os.close(self.counter)

@@ -1,7 +1,7 @@
-"""Who may touch a rack: one thread at a time, and the one that scans goes first.
+"""The lock of a rack: one thread at a time, and the scanning thread goes first.
 
-A plain lock is not handed over: a thread that takes message after message releases and takes it again before the one
-that scans, awake since then, has run.
+A plain lock is not handed over: a thread that takes message after message releases it and acquires it again before
+the scanning thread, which this wakes, has run.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import time
 from types import TracebackType
 
 _YIELD_S = 0.0001
-"""How long a visitor stands aside for a scan that is due, s, before it looks again."""
+"""Seconds that another thread waits before it checks again whether a scan is due."""
 
 
 class RackLock:
-    """The rack's lock: ``with turns`` for a visitor, also within itself; ``with turns.scanner`` to scan."""
+    """The reentrant lock of a rack: ``with lock`` to access it, ``with lock.for_scan`` to scan."""
 
     def __init__(self) -> None:
-        """Nobody is in."""
+        """Create it unlocked."""
         self._lock = threading.RLock()
         self._owner = 0
         self._depth = 0
@@ -26,14 +26,14 @@ class RackLock:
         self.for_scan = _Scanner(self)
 
     def __enter__(self) -> None:
-        """Come in as a visitor: not while a scan waits."""
+        """Acquire the lock, but not while a scan waits for it."""
         if self._owner != threading.get_ident():
             while self._due:
                 time.sleep(_YIELD_S)
         self._enter()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Go out."""
+        """Release the lock."""
         self._leave()
 
     def _enter(self) -> None:
@@ -54,15 +54,15 @@ class RackLock:
 
 
 class _Scanner:
-    """The turn of the thread that scans."""
+    """The lock as the scanning thread uses it."""
 
     def __init__(self, turns: RackLock) -> None:
         self._turns = turns
 
     def __enter__(self) -> None:
-        """Come in before all visitors that wait."""
+        """Acquire the lock ahead of all waiting threads."""
         self._turns._enter_first()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Go out."""
+        """Release the lock."""
         self._turns._leave()

@@ -1,9 +1,9 @@
-"""The senders of one topic, told apart by their GID: which of their messages has come, and which has not.
+"""Messages of a topic as bytes, with their size, sender and number, taken one by one on demand.
 
-Messages of a topic as bytes, with their size, their sender and their number, taken one by one where one looks.
+rclpy's executors take a message as soon as it arrives, whatever its size. Here messages wait in DDS, as many as the
+quality of service keeps, until they are taken; those longer than wanted are never copied into Python bytes.
 
-rclpy's executors take a message as soon as it comes, whatever its size. Here it waits in DDS, as many as the quality of
-service keeps, until somebody takes it; longer ones than wanted are never made bytes of Python's.
+``SequenceTracker`` detects lost and duplicate messages of each sender, distinguished by GID.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from automax_ros.ros.intake.rcl import OK, TAKE_FAILED, Bytes, Library, MessageI
 
 
 class RawMessage(NamedTuple):
-    """A message: its bytes (none where it is longer than wanted), its size, when it was sent (ns, the sender's clock).
+    """A message: its bytes (None if it is longer than wanted), its size, when it was sent (ns, the sender's clock).
 
-    ``number`` counts the sender's messages of the topic, 0 where that is not known; ``sender`` is the publisher's GID,
-    as the graph tells it too (``endpoint_gid``), empty where it is not known.
+    ``number`` counts the sender's messages of the topic, 0 if unknown; ``sender`` is the publisher's GID, as in the
+    graph (``endpoint_gid``), empty if unknown.
     """
 
     payload: bytes | None
@@ -32,16 +32,16 @@ class RawReader(Protocol):
     """Takes the messages of one subscription."""
 
     def take(self) -> RawMessage | None:
-        """Return the next message, None where there is none.
+        """Return the next message; None if there is none.
 
         Raises:
-            InvalidHandle: of rclpy's; the subscription was destroyed.
+            InvalidHandle: rclpy's; the subscription was destroyed.
             RuntimeError: the middleware fails.
         """
 
 
 def taker_of(subscription: Any, most_bytes: int) -> RawReader:
-    """Return what takes the messages of a subscription of rclpy's; longer ones than ``most_bytes`` come without bytes.
+    """Return the reader of an rclpy subscription; messages longer than ``most_bytes`` have no payload.
 
     No executor may serve the subscription.
     """
@@ -50,7 +50,7 @@ def taker_of(subscription: Any, most_bytes: int) -> RawReader:
 
 
 class _RclTaker:
-    """By rcl itself, without the interpreter."""
+    """Reads with rcl itself, without holding the interpreter."""
 
     def __init__(self, rcl: Library, subscription: Any, most_bytes: int) -> None:
         self._rcl, self._handle, self._most_bytes = rcl, subscription.handle, most_bytes
@@ -77,7 +77,7 @@ class _RclTaker:
 
 
 class _RclpyTaker:
-    """By rclpy, where rcl is not found: a long message holds up all threads while it is copied."""
+    """Reads with rclpy, where rcl is not found: a long message holds up all threads while it is copied."""
 
     def __init__(self, subscription: Any, most_bytes: int) -> None:
         self._handle, self._class, self._most_bytes = subscription.handle, subscription.msg_type, most_bytes
@@ -97,18 +97,18 @@ class _RclpyTaker:
 MOST_SENDERS = 64
 """Most senders of a topic that are remembered (decision: a bound); the one known longest is forgotten first."""
 MOST_MISSING = 1_000_000
-"""A sender whose numbers leap further is not counted: numbers are what a stranger says."""
+"""A larger gap in a sender's numbers is not counted: any program can send any number."""
 
 
 class SequenceTracker:
     """The number of the last message of each sender."""
 
     def __init__(self) -> None:
-        """None has sent yet."""
+        """Create it without senders."""
         self._last: dict[bytes, int] = {}
 
     def missing(self, taken: RawMessage) -> int | None:
-        """Return how many messages of its sender did not come before this one; None where it has come already."""
+        """Return how many messages of the sender are missing before this one; None if it has arrived already."""
         last = self._last.get(taken.sender)
         if last is None and len(self._last) >= MOST_SENDERS:
             del self._last[next(iter(self._last))]

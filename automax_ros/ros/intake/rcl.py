@@ -1,10 +1,10 @@
-"""The calls of rcl, the C library that rclpy stands on, that rclpy 7 (ROS 2 Jazzy) does not offer as a rack needs them.
+"""Calls of rcl, the C library below rclpy, that rclpy 7 (ROS 2 Jazzy) does not offer as a rack needs them.
 
 rclpy takes a message while it holds the interpreter: 10 MB hold up all threads for 20 to 70 ms (measured on the two
-cores of a virtual machine). It does not tell the sender. Its wait set costs 2.7 us for each entity and wait. Called by
-ctypes, rcl takes a message without the interpreter, says who sent it, and counts what comes in an eventfd that a thread
-can wait for. The structures are those of rcl's public headers, the same from Humble on. Where the library is not found
-(``library`` returns None) rclpy's own way is taken.
+cores of a virtual machine). It does not report the sender. Its wait set costs 2.7 us for each entity and wait. Called
+by ctypes, rcl takes a message without holding the interpreter, reports its sender, and counts arrivals in an eventfd
+that a thread can wait for. The structures are those of rcl's public headers, the same from Humble on. Where the library
+is not found (``library`` returns None) rclpy is used.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from typing import Any
 GID_BYTES = 16
 OK = 0
 TAKE_FAILED = {401, 601}
-"""RCL_RET_SUBSCRIPTION_TAKE_FAILED, RCL_RET_SERVICE_TAKE_FAILED: there is nothing."""
+"""RCL_RET_SUBSCRIPTION_TAKE_FAILED, RCL_RET_SERVICE_TAKE_FAILED: nothing to take."""
 _KEPT_BYTES = 1 << 20
-"""A buffer that has grown beyond this is given back."""
+"""A buffer that has grown beyond this is released."""
 _MAPS = Path("/proc/self/maps")
 
 
@@ -75,10 +75,10 @@ class ServiceInfo(ctypes.Structure):
 
 
 class Library:
-    """rcl as this process has it loaded."""
+    """rcl as loaded into this process."""
 
     def __init__(self, rcl: ctypes.CDLL, rcutils: ctypes.CDLL) -> None:
-        """Look the functions up.
+        """Look up the functions.
 
         Raises:
             AttributeError: one is missing.
@@ -93,16 +93,15 @@ class Library:
         self.on_message.argtypes = [ctypes.c_void_p] * 3
         self.on_request = rcl.rcl_service_set_on_new_request_callback
         self.on_request.argtypes = [ctypes.c_void_p] * 3
-        # On the thread that failed, without the interpreter between: the state is the thread's own.
+        # To be called on the thread that failed, right after: the error state is thread-local.
         self.reset_error = rcutils.rcutils_reset_error
         self._release = rcutils.rcutils_uint8_array_fini
         self._release.argtypes = [ctypes.c_void_p]
         default = rcutils.rcutils_get_default_allocator
         default.restype = Allocator
         self._allocator = default()
-        # void eventfd_write(int, eventfd_t) has the form of rcl's callback, void (const void *, size_t): what is given
-        # as user data is the descriptor, the number of messages is what the counter grows by. So no Python runs on a
-        # thread of DDS.
+        # void eventfd_write(int, eventfd_t) has the signature of rcl's callback, void (const void *, size_t): the user
+        # data is the descriptor, the number of messages is added to the counter. So no Python runs on a thread of DDS.
         self.count_in = ctypes.cast(ctypes.CDLL(None).eventfd_write, ctypes.c_void_p)
 
     def buffer(self) -> Bytes:
@@ -118,7 +117,7 @@ class Library:
 
 @functools.cache
 def library() -> Library | None:
-    """Return rcl as rclpy has loaded it into this process; None where it is not found or has not what is needed."""
+    """Return rcl as rclpy has loaded it into this process; None if it is not found or lacks a function."""
     if not sys.platform.startswith("linux") or not hasattr(os, "eventfd"):
         return None
     import rclpy.impl.implementation_singleton  # noqa: F401 loads it
@@ -133,7 +132,7 @@ def _opened(name: str) -> ctypes.CDLL:
     """Return a library that this process has loaded; wheels add a hash to its name.
 
     Raises:
-        OSError: it has not.
+        OSError: it is not loaded.
     """
     wanted = re.compile(rf"lib{name}(-[0-9a-f]+)?\.so[0-9.]*")
     for path in _loaded():

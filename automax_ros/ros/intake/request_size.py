@@ -1,4 +1,4 @@
-"""What a message costs to be turned into Python objects, told from its C structure before that is done.
+"""Estimates the cost of converting a message to Python objects from its C structure, before converting it.
 
 The structures are those that rosidl generates for C: fields in order, aligned as C aligns them; a string or a sequence
 is an address, its length and its capacity.
@@ -30,7 +30,7 @@ a number 1. So 680 parameters, 3,800 texts, 65,000 numbers or 1 MB of text are t
 
 
 class RequestTooLarge(Exception):
-    """A message is larger than a rack takes."""
+    """A message is larger than a rack accepts."""
 
 
 class _Many(ctypes.Structure):
@@ -56,16 +56,16 @@ def request_size(kind: Any, address: int) -> int:
     """Return the weight of a message of a class at an address.
 
     Raises:
-        TooHeavy: it is above ``MOST``.
+        RequestTooLarge: it is above ``MOST``.
     """
     structure, weigh = _structure(kind)
     return weigh(structure.from_address(address))
 
 
 def sequences(kind: Any, address: int) -> list[tuple[str, Any, Any, int]]:
-    """Return the sequences of messages in a message: field, class of the items, the sequence, bytes of an item.
+    """Return the sequences of messages in a message: field, class of the items, the sequence, bytes per item.
 
-    It has ``data``, the address of the items, and ``size``, their number.
+    The sequence has ``data``, the address of the items, and ``size``, their number.
     """
     message = _structure(kind)[0].from_address(address)
     return [
@@ -98,7 +98,7 @@ def _structure(kind: Any) -> tuple[Any, Weigh]:
 
 
 def _part(slot: Any) -> tuple[Any, Weigh | None]:
-    """Return the C type of a field, and what weighs it; None where there is nothing to weigh."""
+    """Return the C type of a field, and the function that weighs it; None if there is nothing to weigh."""
     if isinstance(slot, BasicType):
         return _NUMBERS[slot.typename], None
     if isinstance(slot, AbstractGenericString):

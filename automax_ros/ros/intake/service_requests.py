@@ -1,13 +1,13 @@
-"""Requests to a service as the rack's door takes them: without the interpreter, and weighed before they are read.
+"""Receives requests to a service without holding the interpreter, and weighs them before converting them.
 
-rclpy makes Python objects of a whole request, whatever its size, while it holds all threads up; one that is malformed
-raises from the loop. Here rcl reads a request into its C structure, without the interpreter; one too heavy
-(``message_weight``) or malformed is refused, counted and told. What cannot be bounded: DDS itself takes a request in
-whole before anybody is asked, on a thread of its own.
+rclpy converts a whole request to Python objects, whatever its size, while it holds up all threads; a malformed one
+raises from the loop. Here rcl reads a request into its C structure, without the interpreter; one that is too large
+(``request_size``) or malformed is refused, counted and reported. One thing cannot be bounded: DDS itself receives a
+request as a whole first, on its own thread.
 
-Services that answer later: rclpy answers when a callback returns, and EventsExecutor awaits none.
-
-A callback returns ``DeferredResponse``; its ``begin`` is called with what sends the response, at any later time, once.
+A service can also respond later, which rclpy does not support: it responds when a callback returns, and EventsExecutor
+awaits no callback. The callback returns ``DeferredResponse``; its ``begin`` is called with the function that sends the
+response, to be called once, at any later time.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ Respond = Callable[[Any], None]
 
 @dataclass(frozen=True)
 class DeferredResponse:
-    """Stands for a response that is not known yet."""
+    """Placeholder for a response that is sent later."""
 
     begin: Callable[[Respond], None]
 
 
 def allow_deferred(service: Any) -> None:
-    """Let the callback of a service of rclpy's return ``DeferredResponse``."""
+    """Allow the callback of an rclpy service to return ``DeferredResponse``."""
     send = service.send_response
 
     def send_response(response: Any, header: Any) -> None:
@@ -45,14 +45,14 @@ def allow_deferred(service: Any) -> None:
 
 
 Refuse = Callable[[Any, Exception], Any]
-"""Returns the response to a request that failed: the service's class, why."""
+"""Returns the response to a failed request, from the service's class and the error."""
 
 
 class ServiceRequests:
-    """The way in of one service of rclpy's."""
+    """Receives the requests of one rclpy service."""
 
     def __init__(self, rcl: Library, service: Any, refuse: Refuse) -> None:
-        """Take the service over: no executor may serve it any more."""
+        """Take over the service: no executor may serve it any more."""
         self.name, self.handle = service.srv_name, service.handle
         self._rcl, self._service, self._kind, self._refuse = rcl, service, service.srv_type, refuse
         self._request, self._response = Conversion(self._kind.Request), Conversion(self._kind.Response)
@@ -60,7 +60,7 @@ class ServiceRequests:
         service.send_response = self.respond
 
     def take(self) -> bool:
-        """Take the next request and answer it; a malformed one may stand before others, so two looks are had."""
+        """Take the next request and answer it, in two tries, since a malformed one may precede it."""
         return self._take() or self._take()
 
     def _take(self) -> bool:
@@ -80,18 +80,18 @@ class ServiceRequests:
                 response = self._service.callback(request, self._kind.Response())
             except Exception as error:
                 response = self._refuse(self._kind, error)
-            self._rcl.reset_error()  # rclpy's own callbacks leave one, and rcutils complains at the next on the console
+            self._rcl.reset_error()  # rclpy's callbacks leave one, and rcutils would print a complaint at the next
         finally:
             self._request.destroy(raw)
         self._service.send_response(response, header)
         return True
 
     def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Let rcl call a function for each request."""
+        """Set the C function that rcl calls for each request."""
         return int(self._rcl.on_request(pointer, callback, data))
 
     def respond(self, response: Any, header: RequestId) -> None:
-        """Send a response, or let it be sent later.
+        """Send a response, or defer it.
 
         Raises:
             TypeError: it is not one of this service.
@@ -115,12 +115,12 @@ class ServiceRequests:
 
 
 class Conversion:
-    """The functions that generated code has for a message, from C and to C."""
+    """The functions of generated code that convert a message from C and to C."""
 
     def __init__(self, kind: Any) -> None:
         self._kind, code = kind, kind.__class__
         address = capsule_pointer
-        # With the interpreter (PYFUNCTYPE) where Python objects are made or read; an exception of theirs is raised.
+        # PYFUNCTYPE holds the interpreter, where Python objects are created or read, and raises their exceptions.
         self.create = ctypes.CFUNCTYPE(ctypes.c_void_p)(address(code._CREATE_ROS_MESSAGE))
         self.destroy = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address(code._DESTROY_ROS_MESSAGE))
         self.to_python = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)(address(code._CONVERT_TO_PY))
@@ -129,7 +129,7 @@ class Conversion:
         )
 
     def read(self, raw: int) -> Any:
-        """Return the message, the items of its sequences of messages one by one: between two others may go on."""
+        """Return the message; items of its sequences are converted one by one, so other threads can run between."""
         found = sequences(self._kind, raw)
         counts = [sequence.size for _, _, sequence, _ in found]
         try:

@@ -1,1 +1,1 @@
-"""A node per module, the operator, the rack's tables; `registry` says which module has which."""
+"""A node per module, the operator, the rack's tables; `registry` maps modules to nodes."""

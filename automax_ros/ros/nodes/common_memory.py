@@ -47,7 +47,7 @@ class CommonMemoryNode(ModuleNode):
         for own in stream.topics:
             if own.slot is None:
                 joined = own in (stream.snapshot_topic, stream.backplane_topic)
-                # The image that waits for a late joiner may be as old as the run.
+                # The latched image may be as old as the run.
                 outlets[own] = self.outlet(own, stream.send_image if joined else None)
         self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
         self._files: list[RackFile] = []
@@ -63,7 +63,7 @@ class CommonMemoryNode(ModuleNode):
         self.diagnose(self._module_health)
 
     def _with_files(self, publish: Take) -> Take:
-        """Return what publishes an operation and, where it was a reload, the files that the rack runs from now."""
+        """Return a function that publishes an operation and, after a reload, the files that the rack now runs from."""
 
         def take(stamp: int, payload: bytes) -> None:
             self.offer_files()
@@ -72,7 +72,7 @@ class CommonMemoryNode(ModuleNode):
         return take
 
     def _module_health(self, _: int) -> list[DiagnosticStatus]:
-        """Return the health of the module that holds common memory; a lone Processor tells its own."""
+        """Return the health of the module that holds common memory; a lone Processor reports its own."""
         rack = self.site.rack
         module = next(item for item in rack.config.modules if item.slot == rack.config.common_memory_slot)
         if module.tick_ns:
@@ -83,7 +83,7 @@ class CommonMemoryNode(ModuleNode):
         return [self.status(module.model, level, text, module.slot, values)]
 
     def offer_files(self) -> None:
-        """Send the rack's files again if one of them is another now."""
+        """Publish the rack's files again if one of them has changed."""
         rack = self.site.rack
         files = files_of(rack)
         if files != self._files:
@@ -92,7 +92,7 @@ class CommonMemoryNode(ModuleNode):
 
 
 class _ValueInlet:
-    """Writes of one variable from ROS."""
+    """Receives writes to one variable from ROS."""
 
     def __init__(self, node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
         self._node, self._view, self._variable = node, view, variable
@@ -112,18 +112,18 @@ class _ValueInlet:
 
 
 def _most_bytes(variable: CommonVariable) -> int:
-    """Return how long a message with a whole variable can be, bytes.
+    """Return the greatest length of a message with a whole variable, bytes.
 
-    8 for each element are the most of any type, 4 for each character; an array's layout may have names of its own.
+    An element has at most 8, whatever its type, a character 4; an array's layout may contain names.
     """
     return _LAYOUT_BYTES * variable.is_array + variable.elements * (_NUMBER_BYTES + 4 * variable.length)
 
 
 def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:
-    """Return what a message writes: (element, value) of the whole variable.
+    """Return what a message writes, the whole variable, as (element, value).
 
     Raises:
-        MemoryValueError: an array message of another length than the variable's.
+        MemoryValueError: the length of an array message differs from the variable's.
     """
     if not variable.is_array:
         return [(0, message.data)]

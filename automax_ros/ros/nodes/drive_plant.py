@@ -4,10 +4,10 @@ Publishes: ``joint_states`` (sensor_msgs/JointState), the shaft as a joint with 
 (automax_msgs/PlantState), both 100 times per second of rack time; its part of ``/diagnostics``.
 
 Subscribes: ``plants/NAME/load_torque/set`` (std_msgs/Float64, N m) where the plant's load says ``ros: in``, and no
-other topic. A torque counts from the instant at which it comes. Observers are told of no operation: PlantState shows
-the load (decision).
+other topic. A torque applies from the instant of its arrival. Observers are not notified of an operation: PlantState
+shows the load (decision).
 
-The plant is the scheduler's: nothing here lets its time pass, and nothing waits for ROS.
+The scheduler runs the plant: this node does not advance its time, and the plant never waits for ROS.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class DrivePlantNode(ModuleNode):
             self._inlet.refuse(f"the load of {self._driven.name}", refused)
 
     def _health(self, _: int) -> list[DiagnosticStatus]:
-        """Return the plant's health: WARN with something broken, or where gates were newly fired late; else OK."""
+        """Return the plant's health: WARN with a fault, or with late firings since the last report; else OK."""
         state = self.site.stream.plants.last(self._driven.name)
         if state is None:
             return []

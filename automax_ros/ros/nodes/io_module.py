@@ -1,7 +1,7 @@
 """The node of an I/O module: ``digital_io_SLOT``, ``analog_io_SLOT``, ``pulsetach_SLOT``, ``drive_SLOT`` and others.
 
-Publishes: its part of ``/diagnostics``, with its registers. Its points are common variables, which have topics of their
-own (``common_memory``).
+Publishes: its part of ``/diagnostics``, with its registers. Its points are common variables, which have their own
+topics (``common_memory``).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class IoModuleNode(ModuleNode):
         self.diagnose(self._health)
 
     def _health(self, _: int) -> list[DiagnosticStatus]:
-        """Return the registers as hexadecimal words; the module itself is always well."""
+        """Return the registers as hexadecimal words; the module itself is always OK."""
         values = {}
         if self._bank is not None:
             for register in self._shown:

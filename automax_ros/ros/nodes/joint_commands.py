@@ -1,9 +1,9 @@
-"""Commands of joints, as the controllers of ros2_control take them.
+"""Commands of joints, in the form of ros2_control's controllers.
 
 ``/RACK/JOINT_velocity_controller/commands`` (rad/s) and ``/RACK/JOINT_effort_controller/commands`` (N m) are
 std_msgs/Float64MultiArray with one number, as a ``JointGroupVelocityController`` or ``JointGroupEffortController`` of
-one joint hears it. A command writes the common that the rack file names, as a message on that common's own ``/set``
-does: between two scans, as the writer ``ros``. The last command holds: a controller that has gone stops nothing
+one joint receives it. A command writes the common that the rack file names, as a message on that common's own ``/set``
+does: between two scans, as the writer ``ros``. The last command stays in force when a controller disappears
 (decision: so do forward_command_controller and every other ``/set``).
 """
 
@@ -26,7 +26,7 @@ MOST_BYTES = 1024
 
 
 class JointInlet:
-    """The commands of one joint by one interface."""
+    """Receives the commands of one joint by one interface."""
 
     def __init__(self, node: ModuleNode, command: JointCommand) -> None:
         """Subscribe."""
@@ -54,7 +54,7 @@ class JointInlet:
 
 
 def joint_inlets(node: ModuleNode) -> list[JointInlet]:
-    """Open the commands of all joints of the rack on a node."""
+    """Subscribe a node to the commands of all joints of the rack."""
     return [JointInlet(node, command) for command in node.site.rack.config.joint_commands]
 
 

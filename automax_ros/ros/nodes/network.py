@@ -1,12 +1,12 @@
 """The node ``network_SLOT``: a network module 57C404, whose cable is a topic.
 
 Publishes: ``/dcsnet/NETWORK`` (automax_msgs/NetworkDrop), one message for each drop that the module sends, once per
-cycle of 5.5 ms; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second, and at once when a drop is lost or
-heard again, or another module uses its drops.
+cycle of 5.5 ms; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second, and immediately when a drop is lost
+or received again, or another module uses its drops.
 
-Subscribes: ``/dcsnet/NETWORK``. Messages are taken at the rack's door as bytes, longer ones than any of a station are
-dropped unread; the last ``MOST_WAITING`` wait for the next cycle, are read then, and given to the module between two
-scans.
+Subscribes: ``/dcsnet/NETWORK``. Messages are taken as bytes by ``MessageIntake``, which discards unread those longer
+than any of a station; the last ``MOST_WAITING`` wait for the next cycle, are decoded then, and passed to the module
+between two scans.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from automax_ros.ros.intake.rcl import library
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 TELL_INTERVAL_S = 0.2
-"""What changes on the network is logged at most this often."""
+"""Changes on the network are logged at most this often."""
 TYPE = "automax_msgs/msg/NetworkDrop"
 MOST_WAITING = NETWORK.depth
-"""Messages that wait for the next cycle; of more the oldest are lost, as they would be on DDS's side."""
+"""Most messages that wait for the next cycle; of more the oldest are discarded, as DDS would do."""
 MOST_BYTES = len(encode(NetworkDrop(0, 0, "R" * 8, 0, 0, 0, False, 0, 0, (0,) * HALF))) + MAX_TRAILING
-"""Length of the longest message that a station sends, with what a DDS may put after it."""
+"""Length of the longest message that a station sends, with the bytes that a DDS may append."""
 
 
 class NetworkNode(ModuleNode):
@@ -80,7 +80,7 @@ class NetworkNode(ModuleNode):
             self._publish(stamp, encode(message))
 
     def _look(self) -> None:
-        """Give the module what has come, and tell how it stands where that has changed."""
+        """Pass the messages received to the module, and report its status if that has changed."""
         waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
         if waiting:
             arrived = [_read(payload) for payload in waiting]
@@ -128,28 +128,28 @@ class NetworkNode(ModuleNode):
 
 
 class _Cable:
-    """The network's topic, as the rack's door serves it: what comes joins those that wait."""
+    """The network's topic, as ``MessageIntake`` reads it: messages are queued for the next cycle."""
 
     def __init__(self, subscription: Any, waiting: deque[bytes]) -> None:
         self.name, self.handle, self._waiting = subscription.topic_name, subscription.handle, waiting
         self._taker = taker_of(subscription, MOST_BYTES)
 
     def take(self) -> bool:
-        """Take the next message, b"" in place of one that is too long."""
+        """Queue the next message; b"" replaces one that is too long."""
         taken = self._taker.take()
         if taken is not None:
             self._waiting.append(taken.payload or b"")
         return taken is not None
 
     def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Let rcl call a function for each message."""
+        """Set the C function that rcl calls for each message."""
         rcl = library()
         assert rcl is not None
         return int(rcl.on_message(pointer, callback, data))
 
 
 def _read(payload: bytes) -> tuple[Sender, DropMessage] | None:
-    """Return what a message says, None where it says nothing."""
+    """Return sender and content of a message; None if it is malformed."""
     try:
         found = decode(TYPE, payload)
     except CdrError:

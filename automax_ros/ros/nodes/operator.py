@@ -7,10 +7,8 @@ Services, all in the rack's namespace: ``run``, ``stop``, ``clear`` (also ``clea
 ``forces`` (automax_msgs/ReadValues), ``errors`` (automax_msgs/ReadErrors), ``tasks`` (automax_msgs/ReadTasks),
 ``status`` (automax_msgs/ReadStatus).
 
-A request is carried out between two scans; the answer says whether, if not, why, and what is true now. Refusals are
-counted in the rack's health.
-
-What the operator's services do, and what they answer.
+A request is executed between two scans; the response says whether it succeeded, if not, why, and what is true now.
+Refusals are counted in the rack's health.
 """
 
 from __future__ import annotations
@@ -53,23 +51,23 @@ from automax_ros.ros.nodes.tables import status_of_task, task_fields
 from automax_ros.runtime.tasks.task import Status
 
 PLACES = ("first", "second", "last")
-"""What the error log keeps."""
+"""The entries that the error log keeps."""
 MOST_TOLD = 300
-"""Most characters of an unforeseen error that an answer tells."""
+"""Most characters of an unforeseen error in a response."""
 Act = Callable[[Any, Any], object]
-"""Carries a request out and may fill the response in; raises OperationRefused."""
+"""Executes a request and may fill in the response; raises OperationRefused."""
 Tell = Callable[[Any, Any], None]
-"""Fills in what is true now, after a request that was carried out or refused."""
+"""Fills in what is true now, after a request was executed or refused."""
 
 
 def _nothing(_: Any, __: Any) -> None:
-    """Tell nothing further."""
+    """Fill in nothing."""
 
 
 class OperatorServices:
-    """Serves requests by the services of one node. ``close`` when it leaves the graph.
+    """The operator's services on one node. Call ``close`` when it leaves the graph.
 
-    ``forward_by``, once it is set, passes on what concerns other processes of a distributed rack.
+    ``forward_by``, once set, forwards requests that concern other processes of a distributed rack.
     """
 
     def __init__(self, node: ModuleNode, name_of: Callable[[str], str] = str) -> None:
@@ -110,7 +108,7 @@ class OperatorServices:
         self._reloading.close()
 
     def run_everywhere(self, done: Callable[[str], None]) -> None:
-        """Put all tasks into RUN, in all processes of a distributed rack; ``done`` is told why not, "" if they run."""
+        """Put all tasks into RUN, in all processes of the rack; ``done`` gets the reason of a refusal, else ""."""
 
         def respond(response: Any) -> None:
             done("" if response.success else response.message or "refused")
@@ -122,7 +120,7 @@ class OperatorServices:
             respond(answer)
 
     def _serve(self, kind: Any, name: str, act: Act, tell: Tell = _nothing) -> Callable[[Any, Any], Any]:
-        """Create a service, and return what answers it: a response, or ``DeferredResponse``."""
+        """Create a service, and return its callback, which returns a response or ``DeferredResponse``."""
 
         def answered(request: Any, response: Any) -> Any:
             with self._site.between_scans():
@@ -146,7 +144,7 @@ class OperatorServices:
         return routed
 
     def _concluded(self, name: str, request: Any, response: Any, error: Exception | None, tell: Tell) -> Any:
-        """Return a response with how the request ended, and what is true now."""
+        """Return a response with the outcome of the request, and what is true now."""
         reason = "" if error is None else str(error)
         if error is not None and not isinstance(error, OperationRefused):
             reason = f"{type(error).__name__}: {reason[:MOST_TOLD]}"
@@ -171,7 +169,7 @@ class OperatorServices:
     # What is true now
 
     def _task_now(self, request: Any, response: Any) -> None:
-        """Tell how a task stands; nothing where none or no such task is meant."""
+        """Fill in the status of a task; nothing if the request names none, or an unknown one."""
         if request.task.strip():
             (name,) = self._orders.tasks_named(request.task)
             response.status = status_of_task(self._rack, self._rack.task(name))
@@ -191,7 +189,7 @@ class OperatorServices:
         response.powered = self._rack.operations.powered
 
     def _give(self, act: Callable[[str, str], None], request: Any, response: Any) -> None:
-        """Give a variable a value; what it held before is told, too."""
+        """Write a variable; the response contains its previous value, too."""
         with suppress(OperationRefused):
             response.before = self._held(request.name)
         act(request.name, request.value)
@@ -201,14 +199,14 @@ class OperatorServices:
         return value
 
     def _value_now(self, request: Any, response: Any) -> None:
-        """Tell what a variable holds; nothing where no such variable is meant."""
+        """Fill in the value of a variable; nothing if the request names none, or an unknown one."""
         if request.name.strip():
             response.now = self._held(request.name)
 
     def _forced_now(self, _: Any, response: Any) -> None:
         response.forced = [name for name, _ in self._orders.forces()]
 
-    # What is more than one order
+    # Services that need more than one operation
 
     def _step(self, request: Any, response: Any) -> None:
         try:
@@ -267,7 +265,7 @@ class OperatorServices:
         response.racks = self._racks()
 
     def _racks(self) -> int:
-        """Return how many racks of this name are seen, 0 where it was not looked for long enough (decision: 1 s)."""
+        """Return how many racks of this name are seen; 0 until the graph was watched long enough (decision: 1 s)."""
         if time.monotonic_ns() - self._begun_ns < ALONE_NS:
             return 0
         return len(racks_of(self._node, self._node.get_namespace()))

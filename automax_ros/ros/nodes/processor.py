@@ -1,18 +1,14 @@
-"""The node ``processor_SLOT``: a Processor module with its tasks.
+"""The nodes ``processor_SLOT`` and ``udc_SLOT``: a Processor or UDC module with its tasks.
 
 Publishes: ``/RACK/scans`` (automax_msgs/Scan) and ``/RACK/states`` (automax_msgs/TaskState) of its tasks, with a state
-and a full Scan of each for whoever joins late; its part of ``/diagnostics``: a status of
-its own and one of each task.
+and a full Scan of each for late joiners; its part of ``/diagnostics``: a status of the module and one of each task.
 
 Parameters: ``TASK.NAME`` for each tunable of a task, with limits and step in the descriptor; setting one tunes the
 task.
 
-Its tasks' run-time errors and PRINT lines go to /rosout. It is a managed node (``managed_module``).
+Its tasks' run-time errors and PRINT lines go to /rosout. It is a managed node (``ros/base/module_lifecycle``).
 
-The node ``udc_SLOT``: a UDC module with its tasks.
-
-It does for its tasks all that a Processor's node does; ``/diagnostics`` also tells of the common clock, the next scan,
-and the scans per interrupt.
+For a UDC, ``/diagnostics`` also shows the common clock, the next scan, and the scans per interrupt.
 """
 
 from __future__ import annotations
@@ -37,13 +33,13 @@ from automax_ros.runtime.scan.error_log import LogEntry
 from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
 
 ERROR_INTERVAL_S = 1.0
-"""A STOP ALL, and a task's run-time errors, are reported at most this often ..."""
+"""A STOP ALL, and a task's run-time errors, are logged at most this often."""
 ERRORS_SHOWN = 5
-"""... and then this many of one scan."""
+"""Most errors of one scan that are logged."""
 
 
 class ProcessorNode(ManagedModuleNode):
-    """Serves one Processor; the scheduler of the rack scans its tasks."""
+    """Node of one Processor; the scheduler of the rack scans its tasks."""
 
     def __init__(self, site: RackContext, processor: Module) -> None:
         """Create publishers and parameters, and observe the rack."""
@@ -84,15 +80,15 @@ class ProcessorNode(ManagedModuleNode):
                 self.get_logger().warning(describe())
 
     def written(self, writes: list[WriteGroup]) -> None:
-        """Writes from outside do not concern a Processor."""
+        """Ignore writes from outside."""
 
     def tuned(self, task: Task, now_ns: int) -> None:  # noqa: ARG002
-        """Let the parameters follow whoever has tuned a task otherwise."""
+        """Update the parameters after a task was tuned by other means."""
         if task.slot == self._slot:
             self.tunables.follow(task)
 
     def operated(self, operation: Operation) -> None:
-        """Report a STOP ALL, and the health of the tasks after each operation on one of them."""
+        """Log a STOP ALL; update parameters and lifecycle state after operations on the tasks."""
         if operation.what == "stop_all" and operation.ok and self._stop_throttle.passes():
             self.get_logger().error(f"STOP ALL: {operation.reason}")
         concerned = [task for task in self._tasks if operation.concerns(task.name)]
@@ -125,9 +121,9 @@ class ProcessorNode(ManagedModuleNode):
         return self.status(config.model, level, text, config.slot, values)
 
     def _status(self, task: Task, now_ns: int) -> DiagnosticStatus:
-        """Return a task's health: ERROR when faulted, WARN when stopped, erring or newly late, else OK (REP-107).
+        """Return a task's health: ERROR if faulted, WARN if stopped, with errors or newly late, else OK (REP-107).
 
-        A BASIC task that has come to its END has done what it was to do: OK (decision).
+        A BASIC task that has reached its END has done its work: OK (decision).
         """
         statistics = self._rack.statistics[task.name]
         newly_skipped = self.site.diagnostics.newly(task.name, statistics.skipped)
@@ -170,7 +166,7 @@ _SHOWN = {"iscr": ISCR, "scans_per_interrupt": SCANS_PER_INTERRUPT, "scans_since
 
 
 class UdcNode(ProcessorNode):
-    """Serves one UDC."""
+    """Node of one UDC."""
 
     def __init__(self, site: RackContext, udc: Module) -> None:
         """Create publishers and parameters, and observe the rack."""
@@ -178,7 +174,7 @@ class UdcNode(ProcessorNode):
         super().__init__(site, udc)
 
     def _module_status(self, tasks: list[DiagnosticStatus]) -> DiagnosticStatus:
-        """Return the health of the module itself: WARN, too, while its tasks wait for the common clock."""
+        """Return the health of the module itself: also WARN while its tasks wait for the common clock."""
         config, rack = self._udc.config, self.site.rack
         bank = rack.backplane.bank(config.slot)
         assert bank is not None

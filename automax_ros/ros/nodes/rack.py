@@ -4,15 +4,15 @@ Services, as every lifecycle node has them: ``~/change_state``, ``~/get_state``,
 ``~/get_available_transitions``, ``~/get_transition_graph`` (lifecycle_msgs). Publishes ``~/transition_event``.
 
 *configure* reads the rack's YAML file and compiles its tasks; *activate* puts all tasks into RUN; *deactivate* is STOP
-ALL between two scans, which makes all outputs 0; *cleanup* lets the nodes of the modules leave the graph;
-*shutdown* ends the program as SIGTERM does.
+ALL between two scans, which makes all outputs 0; *cleanup* destroys the nodes of the modules; *shutdown* ends the
+program as SIGTERM does.
 
 A rack that a fault has stopped stays active (decision): a manager that finds a node inactive that it has not
-deactivated brings the whole system down, and ``/diagnostics`` tell of the fault. ``deactivate`` and ``activate`` put
-its tasks into RUN again, once the error log of the faulted one is cleared. Who puts tasks into RUN otherwise, as an
-operator does, makes the node active (decision): what is inactive does not run.
+deactivated brings the whole system down, and ``/diagnostics`` reports the fault. ``deactivate`` and ``activate`` put
+its tasks into RUN again, once the error log of the faulted one is cleared. Tasks that are put into RUN by other means,
+as by an operator, make the node active (decision): an inactive rack does not run.
 
-What a lifecycle manager may ask of a rack that another program holds as a library (``RackNodes``).
+``RackLifecycle`` has the transitions of a rack that another program embeds as a library (``RackNodes``).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class RunningRack(Protocol):
         ...
 
     def activate(self) -> Pending | None:
-        """Put all tasks that rest into RUN."""
+        """Put all stopped tasks into RUN."""
         ...
 
     def deactivate(self) -> None:
@@ -62,7 +62,7 @@ class RunningRack(Protocol):
 
 
 class RackLifecycle:
-    """RUN and STOP ALL of a started rack; its program alone starts, closes and exchanges it (decision)."""
+    """RUN and STOP ALL of a started rack; only its program starts, closes and replaces it (decision)."""
 
     def __init__(self, held: RunningRack) -> None:
         self._held = held
@@ -76,7 +76,7 @@ class RackLifecycle:
         return None
 
     def activate(self) -> Pending | None:
-        """Put all tasks that rest into RUN."""
+        """Put all stopped tasks into RUN."""
         try:
             return self._held.activate()
         except OperationRefused as refused:
@@ -90,13 +90,13 @@ class RackLifecycle:
             raise TransitionRefused(str(refused)) from refused
 
     def configure(self) -> None:
-        """Nothing is left to configure."""
+        """Do nothing: the rack is configured already."""
 
     def cleanup(self) -> None:
-        """Nothing is left."""
+        """Do nothing: the program closes the rack."""
 
     def shutdown(self) -> None:
-        """Nothing ends."""
+        """Do nothing: the program ends itself."""
 
     def fail(self) -> None:
         """STOP ALL, so that no output stays on."""
@@ -127,21 +127,21 @@ class RackNode(LifecycleNode, RackRosNode):
 
 
 class Follower:
-    """Observes a rack, so that the node ``rack`` is active where somebody else has put tasks into RUN."""
+    """Observes a rack, and makes the node ``rack`` active when tasks are put into RUN by other means."""
 
     def __init__(self, manager: LifecycleNode) -> None:
         self._manager = manager
 
     def operated(self, operation: Operation) -> None:
-        """Look whether it has put tasks into RUN."""
+        """Activate the node if the operation has put tasks into RUN."""
         if operation.ok and operation.what in _RUNS:
             self._manager.follow(ACTIVE)
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
-        """Scans change no state."""
+        """Ignore scans: they change no state."""
 
     def written(self, writes: list[WriteGroup]) -> None:
-        """Writes change no state."""
+        """Ignore writes: they change no state."""
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """Tunables change no state."""
+        """Ignore tuning: it changes no state."""

@@ -1,8 +1,6 @@
-"""Which node a module has: one entry for each kind that has one of its own.
+"""The node of each kind of module, and facts about a rack as read-only parameters, for ``ros2 param``.
 
-The common memory is the rack's, with a module for it or without: its node is there always, and first.
-
-Facts about a rack as read-only parameters of its nodes, for whoever looks with ``ros2 param``.
+The common memory belongs to the rack, with or without a module for it: its node always exists, and is the first.
 """
 
 from __future__ import annotations
@@ -36,12 +34,12 @@ Facts = dict[str, tuple[bool | int | float | str, str]]
 
 
 def run_facts(run_id: int) -> Facts:
-    """Return those of one run, which are known once it begins: processes of a distributed rack agree on its number."""
+    """Return the facts of one run, known once it begins: processes of a distributed rack agree on its number."""
     return {"run_id": (run_id, "number of the run, as in VariableTable")}
 
 
 def rack_facts(rack: Rack) -> Facts:
-    """Return those of a whole rack."""
+    """Return the facts of a whole rack."""
     config = rack.config
     return {
         "rack": (config.name, "the rack's name"),
@@ -53,7 +51,7 @@ def rack_facts(rack: Rack) -> Facts:
 
 
 def module_facts(module: ModuleConfig) -> Facts:
-    """Return those of a module."""
+    """Return the facts of a module."""
     facts: Facts = {
         "slot": (module.slot, "the slot it stands in"),
         "model": (module.model, "its catalogue number"),
@@ -82,9 +80,8 @@ NODES: dict[ModuleKind, Callable[[RackContext, Module], ModuleNode] | None] = {
 def nodes_of(site: RackContext) -> tuple[ModuleNode, ...]:
     """Create the nodes of a rack's part: those of its modules by slot.
 
-    Where common memory is, its node and, if the rack has one, the operator's stand first.
-
-    After the modules stand those of the plants that drives turn, by slot and drive.
+    If the part has common memory, its node and, if the rack has one, the operator's come first. Those of the plants
+    that drives turn come last, by slot and drive.
     """
     made: list[ModuleNode] = []
     if site.holds_common_memory:

@@ -1,7 +1,7 @@
 """The service ``reload``: a task's new source is checked and compiled while the rack scans, then installed.
 
-The text comes from the caller: no path of the rack's computer is opened (decision). It is compiled on a thread of its
-own, one at a time: another reload is refused meanwhile (decision: a bound on what callers can ask for at once).
+The text comes from the caller: no path of the rack's computer is opened (decision). It is compiled on a separate
+thread, one at a time: another reload is refused meanwhile (decision: a bound on what callers can ask for at once).
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.intake.service_requests import DeferredResponse, Respond
 
 Conclude = Callable[[Any, Any, Exception | None], Any]
-"""Returns a response to a request, with how it ended and what is true now; called between two scans."""
+"""Returns the response to a request, with its outcome and what is true now; called between two scans."""
 
 
 class Reloading:
-    """Carries out the reloads that are asked of one node; ``close`` when it leaves the graph."""
+    """Executes the reload requests of one node; call ``close`` when it leaves the graph."""
 
     def __init__(self, node: ModuleNode, orders: OperatorRequests, conclude: Conclude) -> None:
-        """Begin with none."""
+        """Create it without a reload in progress."""
         self._site, self._orders, self._conclude = node.site, orders, conclude
         self._work = Background(node)
         self._reloading = ""
 
     def answer(self, request: Any, response: Any) -> Any:
-        """Answer a request: at once where it is refused, else when its source is compiled."""
+        """Answer a request: at once if it is refused, else when its source is compiled."""
         with self._site.between_scans():
             try:
                 self._refuse_second(request.task)

@@ -1,11 +1,11 @@
-"""Parameters with which a rack starts: tunables get the values that the command line gives; what has no use is told.
+"""Parameters at the start of a rack: tunables get the values of the command line; unused ones are reported.
 
-The order of what counts more (decision): a source's ``CURRENT=`` < the value kept from the last run < ``--params-file``
-and ``-p`` < ``--set`` of the command. They are set as a client would set them, before the rack runs, so that they are
-recorded with the states at the start, and kept. One that the task refuses keeps the rack from starting. A whole number
-is taken for a REAL (decision: ``KP: 1`` is meant, though ROS tells the types apart).
+Order of precedence, lowest first (decision): a source's ``CURRENT=`` < the value kept from the last run <
+``--params-file`` and ``-p`` < ``--set`` of the command. They are set as a client would set them, before the rack runs,
+so that they are recorded with the states at the start, and kept. If a task refuses one, the rack does not start. A
+whole number is accepted for a REAL (decision: ``KP: 1`` is meant, though ROS tells the types apart).
 
-Names of tasks are unique in a rack, so a tunable reaches its task from the node ``rack`` as well (decision: launch
+Names of tasks are unique in a rack, so a tunable can also be given to the node ``rack`` (decision: launch
 gives parameters to the node that it has named).
 """
 
@@ -23,7 +23,7 @@ from automax_ros.ros.setup.arguments import RosArguments
 from automax_ros.ros.setup.parameter_files import GivenParameter, RosArgumentsError
 
 MOST_TOLD = 10
-"""Most parameters without use that are told one by one."""
+"""Most unused parameters that are reported one by one."""
 _ONE_TIME = "use_sim_time is for a whole rack: give it to all nodes, or to the node rack"
 _OWN_OF_ROS = (SIM_TIME, "start_type_description_service", "qos_overrides.")
 """Parameters that rclpy declares, or may."""
@@ -33,12 +33,12 @@ class Tuned(Protocol):
     """A node whose parameters are tunables."""
 
     own_name: str
-    """Its name in the rack, whatever it is called."""
+    """Its name in the rack, before remapping."""
     tunables: TunableParameters
 
 
 def tune_at_start(arguments: RosArguments, namespace: str, nodes: Iterable[Tuned]) -> None:
-    """Give tunables what the command line says.
+    """Set tunables to the values of the command line.
 
     Raises:
         RosArgumentsError: one of them is refused.
@@ -53,12 +53,12 @@ def tune_at_start(arguments: RosArguments, namespace: str, nodes: Iterable[Tuned
 
 
 def without_use(arguments: RosArguments, config: RackConfig, declared: Mapping[str, Iterable[str]]) -> list[str]:
-    """Return what to tell of parameters that reach nobody.
+    """Return the messages about parameters that reach no node.
 
     Args:
-        arguments: what gives them.
-        config: of the rack.
-        declared: the parameters of each node that is here, by its own name; other processes may have more nodes.
+        arguments: the command line that gives them.
+        config: the rack's configuration.
+        declared: the parameters of each node in this process, by its own name; other processes may have more nodes.
     """
     told: dict[tuple[str, str], str] = {}
     for item in arguments.parameters:
@@ -82,7 +82,7 @@ def _reaches_rack(item: GivenParameter, arguments: RosArguments, config: RackCon
 
 
 def _names(config: RackConfig, declared: Mapping[str, Iterable[str]]) -> set[str]:
-    """Return the nodes of a rack, those in other processes included."""
+    """Return the names of a rack's nodes, those in other processes included."""
     return {MAIN_NODE, *declared, *(module.name for module in config.modules)}
 
 
@@ -95,7 +95,7 @@ def _reached(
 
 
 def _without_node(item: GivenParameter, config: RackConfig, declared: Mapping[str, Iterable[str]]) -> str:
-    """Return what to tell of a key that no node has; nothing where it may be for another program."""
+    """Return the message about a key that no node has; "" if it may be for another program."""
     space = f"/{config.namespace}/" if item.key.startswith("/") else ""
     known = [f"{space}{name}" for name in sorted(_names(config, declared))]
     hint = did_you_mean(item.key, known)
@@ -105,7 +105,7 @@ def _without_node(item: GivenParameter, config: RackConfig, declared: Mapping[st
 
 
 def _without_name(item: GivenParameter, reached: set[str], declared: Mapping[str, Iterable[str]]) -> str:
-    """Return what to tell of a name that its nodes do not declare; nothing where it may be for another program."""
+    """Return the message about a name that its nodes do not declare; "" if it may be for another program."""
     having = [node for node, names in declared.items() if item.name in names]
     if reached.intersection(having) or (having and MAIN_NODE in reached):
         return ""

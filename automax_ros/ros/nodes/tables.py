@@ -1,14 +1,12 @@
 """The tables of a live rack on topics: ``tasks`` and ``forces`` (latched, on change), ``statistics`` (each second).
 
-The process of common memory sends forces and the tasks of the whole rack, which it joins from the parts of the others
-(``joined_tasks``); each process sends the statistics of its own modules. A
-table is looked at once per second of rack time, and soon after each operation, ten times per second at most (decision).
+The home, the process with common memory, publishes forces and the tasks of the whole rack; each process publishes the
+statistics of its own modules. A table is checked once per second of rack time, and soon after each operation, ten
+times per second at most (decision).
 
-The tasks of other processes of a rack, in the table that the home sends.
-
-Each other process sends the table of its own modules on ``tasks/parts``, each second and when it changes; the home
-joins them by module. A module that has not been heard of for ``SILENT_NS`` is not in the table (decision): nobody knows
-how its tasks stand.
+Each other process publishes the tasks of its own modules on ``tasks/parts``, each second and when they change; the home
+joins them by module (``JoinedTasks``). A module without a part for ``SILENT_NS`` is not in the table (decision): the
+state of its tasks is unknown.
 """
 
 from __future__ import annotations
@@ -42,14 +40,14 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey
 PARTS = "tasks/parts"
 """The topic of the parts, in the rack's namespace."""
 PART = QosProfile("reliable", "transient_local", "keep_last", 32)
-"""The last parts of all processes wait for the home."""
+"""Latched, so that the home receives the last parts of all processes."""
 SILENT_NS = 3 * NS_PER_S
 MOST_BYTES = 1 << 20
 """Longest part that is read."""
 
 
 class JoinedTasks:
-    """Hears the parts; ``changed`` is called when tasks have come. To be used where common memory is."""
+    """Receives the parts; ``changed`` is called after each. For the process with common memory."""
 
     def __init__(self, node: ModuleNode, changed: Callable[[], None]) -> None:
         """Subscribe."""
@@ -64,12 +62,12 @@ class JoinedTasks:
         BusTopic(node, PARTS, NAMES[RemoteTable], ros_qos(PART), self._take, self._refuse, Terms(MOST_BYTES))
 
     def tasks(self, now_ns: int) -> Sequence[RemoteTask]:
-        """Return the tasks of all modules that were heard of lately."""
+        """Return the tasks of all modules whose parts are recent."""
         return [item for at_ns, items in self._heard.values() if now_ns - at_ns <= SILENT_NS for item in items]
 
     def _take(self, table: RemoteTable, _: bytes) -> None:
         if table.run_id != self._site.stream.run_id:
-            return  # the run before, whose part still waits: the bus tells of other racks
+            return  # latched by the run before; other racks are reported by the bus
         modules: dict[str, list[RemoteTask]] = {}
         for item in table.tasks:
             if item.task not in self._tasks.get((item.module, item.slot), ()):
@@ -85,21 +83,21 @@ class JoinedTasks:
 
 
 PERIOD_NS = NS_PER_S
-"""How often statistics go out and tables are looked at, rack time."""
+"""Period at which statistics are published and tables are checked, rack time."""
 LOOK_NS = 100 * NS_PER_MS
-"""Least time between two looks after operations, rack time."""
+"""Shortest time between two checks after operations, rack time."""
 STATISTICS_DEPTH = 10
 DELETED = "deleted"
-"""The status of a task that was taken out of the rack."""
+"""The status of a task that was deleted from the rack."""
 _UNCOUNTED = frozenset({"scans", "skipped"})
-"""Fields whose change alone is not a reason to send a table of tasks."""
+"""Fields whose change alone is not a reason to publish a table of tasks."""
 
 
 class StatusTables:
-    """Sends the tables of what is in this process, by the publishers of one node."""
+    """Publishes the tables of this process, by the publishers of one node."""
 
     def __init__(self, node: ModuleNode) -> None:
-        """Create the publishers; the first tables go out with the rack's start."""
+        """Create the publishers; the first tables are published when the rack starts."""
         self._rack, self._stream, self._pace = node.site.rack, node.site.stream, node.site.pacer
         part = self._rack.part
         self._tasks = node.create_publisher(TaskTable, "tasks" if part.holds_common_memory else PARTS, ros_qos(LATCHED))
@@ -120,16 +118,16 @@ class StatusTables:
     # RackObserver
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
-        """What scans change is looked at each second."""
+        """Ignore scans: the tables are checked each second."""
 
     def written(self, writes: list[WriteGroup]) -> None:
-        """A force that a program sets is looked at within the second."""
+        """Ignore writes: a force that a program sets is found within the second."""
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """A tunable stands in no table."""
+        """Ignore tuning: no table shows tunables."""
 
     def operated(self, operation: Operation) -> None:  # noqa: ARG002
-        """Look at the tables after what happens at this instant."""
+        """Check the tables after the other events of this instant."""
         self._soon()
 
     def _soon(self) -> None:
@@ -144,7 +142,7 @@ class StatusTables:
         self.look(now_ns)
 
     def look(self, now_ns: int) -> None:
-        """Send the tables that have changed."""
+        """Publish the tables that have changed."""
         tasks = [(module, item) for module in self._rack.task_modules for item in module.tasks]
         infos: list[Mapping[str, Any]] = [task_fields(self._rack, module, item) for module, item in tasks]
         if self._joined is not None:
@@ -163,7 +161,7 @@ class StatusTables:
 
     def _report(self, now_ns: int) -> None:
         if not self._rack.part.holds_common_memory:
-            self._sent.clear()  # so the home knows that this process lives
+            self._sent.clear()  # publish each second, so that the home knows that this process lives
         self.look(now_ns)
         passed_ns, self._reported_ns = now_ns - self._reported_ns, now_ns
         tasks = [statistics_of(module, item, passed_ns) for module in self._rack.task_modules for item in module.tasks]
@@ -186,12 +184,12 @@ class StatusTables:
 
 
 def status_of_task(rack: Rack, task: Task) -> str:
-    """Return how a task stands, in a word."""
+    """Return the status of a task as a word."""
     return DELETED if task.name in rack.operations.deleted else task.status.value
 
 
 def task_fields(rack: Rack, module: Module, item: ScheduledTask) -> Mapping[str, Any]:
-    """Return how a task of a module stands, as the fields of TaskInfo."""
+    """Return the status of a module's task, as the fields of TaskInfo."""
     task, last = item.task, item.task.errors.last
     config = next(config for config in module.config.tasks if config.name == task.name)
     return {
@@ -211,7 +209,7 @@ def task_fields(rack: Rack, module: Module, item: ScheduledTask) -> Mapping[str,
 
 
 def statistics_of(module: Module, item: ScheduledTask, passed_ns: int) -> TaskStatistics:
-    """Return the statistics of a task; the window that has lasted ``passed_ns`` ends, and the next one begins."""
+    """Return the statistics of a task, and end the window, which lasted ``passed_ns``; the next one begins."""
     every, window = item.statistics, item.statistics.take_window()
     return TaskStatistics(
         task=item.name,

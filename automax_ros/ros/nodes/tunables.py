@@ -1,6 +1,6 @@
 """Tunable variables as ROS parameters: ``TASK.NAME`` with limits and step in the descriptor.
 
-The tunables of one node's tasks as its parameters: declared, checked, set, and following whoever tunes otherwise.
+They are declared, checked, set, and updated after a task was tuned by other means.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from automax_ros.runtime.tasks.task import Task
 _GRID_TOLERANCE = 1e-7
 """Stricter than rclpy's 1e-6."""
 _MOST_STEPS = 1_000_000
-"""With more the rounding of floating point can exceed the tolerance."""
+"""With more steps the rounding of floating point can exceed the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,14 @@ class Tunable:
 
     @property
     def initial(self) -> float | int:
-        """The parameter's first value: the one the task has, a REAL with no more digits than it has."""
+        """The parameter's first value: that in the task, a REAL without digits beyond its precision."""
         return self._shown(self.task.value(self.variable))
 
     def descriptor(self) -> ParameterDescriptor:
         """Return limits and step.
 
-        rclpy refuses what does not lie on the grid of LOW and steps, which it computes in floating point. Where that
-        would hit HIGH, the present value or 0, or the grid is too fine, the step stands in the text alone.
+        rclpy refuses values off the grid of LOW and steps, which it computes in floating point. If it would refuse
+        HIGH, the present value or 0, or the grid is too fine, only the text gives the step.
         """
         low, high, step = (self._shown(value) for value in (self.limits.low, self.limits.high, self.limits.step))
         descriptor = ParameterDescriptor(description=f"tunable {self.variable} of task {self.task.name}, step {step:g}")
@@ -75,7 +75,7 @@ def _on_grid(value: float, low: float, step: float) -> bool:
 
 
 def tunables_of(tasks: Sequence[Task]) -> list[Tunable]:
-    """Return all tunables; two of a task that differ only in type get the type's word after the name."""
+    """Return all tunables; if two of a task differ only in type, the type's word is appended to their names."""
     found = []
     for task in tasks:
         symbols = [symbol for symbol in task.compiled.program.symbols.values() if symbol.tuning is not None]
@@ -92,7 +92,7 @@ class TunableParameters:
     """Keeps the parameters of a node equal to the tunables of its tasks."""
 
     def __init__(self, node: Node, rack: Rack, present: Callable[[], AbstractContextManager[None]]) -> None:
-        """Take a node; ``present`` is entered while a task is tuned."""
+        """Create it for a node; ``present`` is entered while a task is tuned."""
         self._node, self._rack, self._present = node, rack, present
         self._tunables: dict[str, Tunable] = {}
         self._following = 0
@@ -101,13 +101,13 @@ class TunableParameters:
 
     @property
     def names(self) -> Iterable[str]:
-        """The parameters."""
+        """The names of the parameters."""
         return self._tunables.keys()
 
     def declare(self, tasks: Sequence[Task]) -> None:
-        """Declare the tunables of tasks, as they are installed now, in place of those that they had.
+        """Declare the tunables of tasks, as installed now, in place of earlier ones.
 
-        What the command line gives is not for rclpy to set: ``start_parameters`` does.
+        Values from the command line are set by ``start_parameters``, not by rclpy.
         """
         for name in [name for name, item in self._tunables.items() if item.task in tasks]:
             del self._tunables[name]
@@ -118,7 +118,7 @@ class TunableParameters:
         self._tunables |= {item.parameter: item for item in found}
 
     def begin_with(self, name: str, value: ParameterValue) -> str:
-        """Set a tunable as a client would; return why that is refused, empty where it is not."""
+        """Set a tunable as a client would; return the reason of a refusal, else ""."""
         if self._tunables[name].type is DataType.REAL and type(value) is int:
             value = float(value)
         try:
@@ -128,7 +128,7 @@ class TunableParameters:
         return "" if result.successful else str(result.reason) or "refused"
 
     def follow(self, task: Task) -> None:
-        """Let the parameters have the values of a task that somebody has tuned."""
+        """Set the parameters to the values of a task that was tuned by other means."""
         changed = [
             Parameter(name, value=item.initial)
             for name, item in self._tunables.items()
@@ -140,12 +140,12 @@ class TunableParameters:
 
     @property
     def _is_own_doing(self) -> bool:
-        """Whether this thread sets parameters because of tunables, or tunables because of parameters."""
+        """Whether this thread is setting parameters because of tunables, or tunables because of parameters."""
         return self._following == threading.get_ident()
 
     @contextmanager
     def _following_now(self) -> Iterator[None]:
-        """Only in the rack's present, where one thread is at a time."""
+        """Make ``_is_own_doing`` true for this thread, which must hold the rack's lock."""
         self._following = threading.get_ident()
         try:
             yield
@@ -153,7 +153,7 @@ class TunableParameters:
             self._following = 0
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
-        """Refuse what a task would refuse, before any of the parameters is set; those that are not tunables pass."""
+        """Refuse values that a task would refuse, before any parameter is set; those of other parameters pass."""
         for parameter in parameters:
             tunable = self._tunables.get(parameter.name)
             if tunable is None:

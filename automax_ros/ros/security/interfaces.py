@@ -1,7 +1,7 @@
-"""What the nodes of a rack open in the graph, read from the nodes themselves.
+"""The topics and services of a rack's nodes, read from the nodes themselves.
 
-They are made as `automax run` makes them, in a context that reaches nobody, asked, and destroyed: no task scans. So a
-policy has what the program does, and not what somebody wrote down of it (decision).
+The nodes are created as `automax run` creates them, in a context that reaches no other program, queried, and destroyed:
+no task scans. So a policy matches the program, not a description of it (decision).
 """
 
 from __future__ import annotations

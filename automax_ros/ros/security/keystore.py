@@ -1,9 +1,9 @@
 """A keystore as ROS 2 reads it: an authority, and for each enclave a key, a certificate and signed permissions.
 
 It has the form of `ros2 security create_keystore`: ``public``, ``private`` and ``enclaves``. The one authority, whose
-key stays in ``private``, signs identities and permissions. An authority that is there is kept, and so are keys of
-enclaves: what is written again is what an enclave may do. So the racks of a plant share one keystore, one after the
-other. The work is openssl's; keys are of the curve prime256v1 and last ``DAYS`` (decision).
+key stays in ``private``, signs identities and permissions. An existing authority is kept, and so are keys of enclaves:
+only permissions are written again. So the racks of a plant can be added to one keystore, one after the other. It calls
+openssl; keys are of the curve prime256v1 and last ``DAYS`` (decision).
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ class KeystoreError(UserError):
 
 
 class Keystore:
-    """A keystore in a folder, made where there is none.
+    """A keystore in a folder, created if there is none.
 
     Raises:
-        KeystoreError: it cannot be written, or openssl is not there.
+        KeystoreError: it cannot be written, or openssl is not installed.
     """
 
     def __init__(self, folder: Path, domain: int) -> None:
-        """Make the authority, unless it is there, and the governance of a ROS domain."""
+        """Create the authority, unless it exists, and the governance of a ROS domain."""
         self.folder, self._domain = folder, domain
         self._certificate = folder / "public" / "ca.cert.pem"
         self._key = folder / "private" / "ca.key.pem"
@@ -57,7 +57,7 @@ class Keystore:
             raise _unwritable(folder, error) from error
 
     def add(self, enclaves: Iterable[Enclave]) -> None:
-        """Write what enclaves need.
+        """Write keys, certificates and permissions of enclaves.
 
         Raises:
             KeystoreError: they cannot be written.
@@ -77,7 +77,7 @@ class Keystore:
                 raise _unwritable(folder, error) from error
 
     def _certify(self, path: str, folder: Path) -> None:
-        """Make key and certificate of an enclave, unless they are there."""
+        """Create key and certificate of an enclave, unless they exist."""
         key, certificate, request = folder / "key.pem", folder / "cert.pem", folder / "request.pem"
         if key.exists() and certificate.exists():
             return
@@ -89,7 +89,7 @@ class Keystore:
         request.unlink()
 
     def _sign(self, stem: Path, text: str) -> None:
-        """Write a text and what DDS reads of it: itself, signed."""
+        """Write a text, and its signed form, which DDS reads."""
         plain = stem.with_suffix(".xml")
         plain.write_text(text, encoding="utf-8")
         _openssl("smime", "-sign", "-text", "-in", plain, "-out", stem.with_suffix(".p7s"),
@@ -97,10 +97,10 @@ class Keystore:
 
 
 def _openssl(*words: object) -> None:
-    """Run openssl; what it writes only its owner reads.
+    """Run openssl; only the owner can read the files that it writes.
 
     Raises:
-        KeystoreError: it is not there, or refuses.
+        KeystoreError: it is not installed, or fails.
     """
     try:
         done = subprocess.run(
@@ -122,7 +122,7 @@ def _openssl(*words: object) -> None:
 
 
 def _link(place: Path, target: Path) -> None:
-    """Let a place lead to a file of the keystore, which may be moved as a whole."""
+    """Link a path to a file of the keystore, relatively, so that the keystore can be moved as a whole."""
     place.unlink(missing_ok=True)
     place.symlink_to(os.path.relpath(target, place.parent))
 

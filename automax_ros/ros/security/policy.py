@@ -1,8 +1,8 @@
-"""The policy and the permissions of enclaves as XML: SROS 2's own form, and that of DDS-Security which it becomes.
+"""The policy and the permissions of enclaves as XML, in the formats of SROS 2 and of DDS-Security.
 
-A policy is what `ros2 security generate_artifacts -p policy.xml` reads (version 0.2.0). Permissions and governance are
-what DDS reads of a keystore: DDS-Security 1.1, sections 9.4.1.2 and 9.4.1.3. In DDS a topic of ROS has ``rt`` in front,
-and a service is a topic for its requests and one for its replies.
+`ros2 security generate_artifacts -p policy.xml` reads a policy (version 0.2.0). DDS reads permissions and governance
+from a keystore: DDS-Security 1.1, sections 9.4.1.2 and 9.4.1.3. In DDS the name of a ROS topic has the prefix ``rt``,
+and a service has one topic for its requests and one for its replies.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 from automax_ros.ros.security.profiles import Enclave, Profile
 
 VERSION = "0.2.0"
-"""Version of the form of policies."""
+"""Version of the format of policies."""
 DISCOVERY = "ros_discovery_info"
-"""The topic on which every process of ROS 2 says which nodes it has."""
+"""The topic on which every process of ROS 2 publishes its nodes."""
 _PARTS = (("topics", "topic", ("publish", "subscribe")), ("services", "service", ("reply", "request")))
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 _SCHEMAS = "http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_"
@@ -39,7 +39,7 @@ _TOPICS = (
 
 
 class Validity(NamedTuple):
-    """From when to when permissions hold: times as ``2026-01-31T00:00:00``, UTC."""
+    """Period in which permissions are valid: times such as ``2026-01-31T00:00:00``, UTC."""
 
     begins: str
     ends: str
@@ -67,7 +67,7 @@ def _add_profile(parent: ElementTree.Element, profile: Profile) -> None:
 
 
 def permissions_text(enclave: Enclave, domain: int, validity: Validity) -> str:
-    """Return what an enclave may do in a ROS domain: the topics of its profiles, and nothing else."""
+    """Return the permissions of an enclave in a ROS domain: the topics of its profiles, and nothing else."""
     root = _dds("permissions")
     grant = ElementTree.SubElement(ElementTree.SubElement(root, "permissions"), "grant", name=enclave.path)
     ElementTree.SubElement(grant, "subject_name").text = f"CN={enclave.path}"
@@ -84,7 +84,7 @@ def permissions_text(enclave: Enclave, domain: int, validity: Validity) -> str:
 
 
 def governance_text(domain: int) -> str:
-    """Return what holds for all in a ROS domain: nobody without a certificate, all topics encrypted and controlled."""
+    """Return the governance of a ROS domain: certificates are required, all topics encrypted and access-controlled."""
     root = _dds("governance")
     rule = ElementTree.SubElement(ElementTree.SubElement(root, "domain_access_rules"), "domain_rule")
     _add_domain(rule, domain)
@@ -97,12 +97,12 @@ def governance_text(domain: int) -> str:
 
 
 def written_topics(enclave: Enclave) -> list[str]:
-    """Return the topics of DDS that an enclave may write."""
+    """Return the DDS topics that an enclave may write."""
     return _dds_topics(enclave.names("publish"), enclave.names("request"), enclave.names("reply"))
 
 
 def read_topics(enclave: Enclave) -> list[str]:
-    """Return the topics of DDS that an enclave may read."""
+    """Return the DDS topics that an enclave may read."""
     return _dds_topics(enclave.names("subscribe"), enclave.names("reply"), enclave.names("request"))
 
 

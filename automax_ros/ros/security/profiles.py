@@ -1,7 +1,7 @@
-"""Who may say and hear what in a rack's graph: profiles of nodes, in enclaves.
+"""Who may publish and subscribe to what in a rack's graph: profiles of nodes, in enclaves.
 
-An enclave is what one process is in ROS 2's security: its certificate, and what that permits. A profile has the full
-names that one node needs.
+An enclave represents one process in ROS 2 security: its certificate and its permissions. A profile has the full names
+that one node needs.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Profile:
-    """What one node publishes, subscribes, serves and calls; full names, in the order of their letters."""
+    """The topics and services that a node publishes, subscribes to, serves and calls: full names, in sorted order."""
 
     namespace: str
     node: str
@@ -24,7 +24,7 @@ class Profile:
 
 @dataclass(frozen=True)
 class Enclave:
-    """What one process may do; ``path`` is what it names with ``--ros-args --enclave``."""
+    """The permissions of one process; ``path`` is its argument of ``--ros-args --enclave``."""
 
     path: str
     profiles: tuple[Profile, ...]
@@ -39,7 +39,7 @@ _OWN_ALWAYS = (LOG, EVENTS)
 
 
 def recorder_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:
-    """Return the enclave of those who watch and record: they hear what the rack says in its namespace, and say nothing.
+    """Return the enclave of observers and recorders, which subscribe to the rack's topics and publish nothing.
 
     ``namespace`` is the rack's, with its slash. Reading values, plots and layouts need no more than this.
     """
@@ -48,7 +48,7 @@ def recorder_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:
 
 
 def operator_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:
-    """Return the enclave of those who operate: they hear the rack, write its ``/set`` topics and call its services."""
+    """Return the enclave of operators, who subscribe to the rack, publish to ``/set`` topics, call its services."""
     enclaves = tuple(rack)
     inputs = sorted(
         name

@@ -1,12 +1,12 @@
-"""What a program of ROS is told on its command line: ``--ros-args RULE... [--]``, anywhere, any number of times.
+"""The ROS arguments of a command line: ``--ros-args RULE... [--]``, anywhere, any number of times.
 
-Names are ours to read, since a rack is many nodes in a namespace of its own; all else is rcl's, which is given the
-words as they stand. Nothing here needs ROS but ``checked``.
+Names are read here, since a rack is many nodes in its own namespace; everything else is passed to rcl unchanged. Only
+``checked`` needs ROS.
 
-- ``__ns`` is where the rack's own namespace goes into: with ``-r __ns:=/plant`` rack PM1 is ``/plant/pm1`` (decision:
+- ``__ns`` is the namespace that contains the rack's own: with ``-r __ns:=/plant`` rack PM1 is ``/plant/pm1`` (decision:
   rcl would put all nodes into ``/plant``, and two racks of one launch file could not be told apart). One that ends in
-  the rack's own, ``/plant/pm1``, is the rack's whole (decision: a LifecycleNode of launch_ros says it so). Without it
-  ROS_NAMESPACE says so, which rcl does not read (decision: ROS 1 and several launch systems set it).
+  the rack's own, ``/plant/pm1``, is the complete one (decision: a LifecycleNode of launch_ros says it so). Without it
+  ROS_NAMESPACE is used, which rcl does not read (decision: ROS 1 and several launch systems set it).
 - ``__node`` names the program's main node, for a rack ``rack``; ``NODE:__node`` names another (decision: rcl would
   give all nodes of the process that one name).
 """
@@ -24,7 +24,7 @@ from automax_ros.ros.setup.parameter_files import GivenParameter, RosArgumentsEr
 
 BEGIN, END = "--ros-args", "--"
 MOST_WORDS, LONGEST_WORD = 1000, 4000
-"""Bounds on what a command line is read for (decision: launch files pass some tens of words)."""
+"""Limits of the ROS arguments that are read (decision: launch files pass some tens of words)."""
 REMAP, PARAM, PARAMS_FILE = "--remap", "--param", "--params-file"
 _SHORT = {"-r": REMAP, "-p": PARAM, "-e": "--enclave"}
 _WITH_VALUE = (REMAP, PARAM, PARAMS_FILE, "--log-level", "--log-config-file", "--log-file-name", "--enclave")
@@ -37,19 +37,19 @@ _LONGEST_SPACE = 200
 _NAMES = ("__node", "__name")
 """Both words name a node, as in rcl."""
 _YES_OR_NO = ("use_sim_time", "start_type_description_service")
-"""Parameters that every node of rclpy's declares: one of another type is an error in the middle of making a node."""
+"""Parameters that every rclpy node declares: one of another type would be an error while a node is being created."""
 
 
 @dataclass(frozen=True)
 class RosArguments:
-    """What was given.
+    """The ROS arguments of a program.
 
     Attributes:
-        namespace: where the program's own namespace goes into, without slashes at its ends; mostly empty.
-        names: other names of nodes by their own; that of the main node under the empty text.
-        rules: option and value, or a switch alone, of all others in their order.
-        parameters: what the rules give nodes at the start, in their order: the last wins.
-        given: whether ``--ros-args`` was there with anything after it.
+        namespace: the one that contains the program's own, without slashes at its ends; mostly empty.
+        names: new names of nodes by their own; that of the main node under the empty text.
+        rules: all others in their order: option and value, or a switch alone.
+        parameters: those that the rules give nodes at the start, in their order: the last wins.
+        given: whether ``--ros-args`` was given with anything after it.
     """
 
     namespace: str = ""
@@ -65,15 +65,15 @@ class RosArguments:
         return f"{self.namespace}/{namespace}".strip("/")
 
     def name_of(self, node: str, *, main: bool = False) -> str:
-        """Return what a node is to be called; ``main`` is the one that a rule without a node means."""
+        """Return the name of a node after remapping; ``main``: it is the one that a rule without a node means."""
         return self.names.get(node) or (self.names.get("", node) if main else node)
 
     def given_to(self, node: str, namespace: str, *, main: bool = False) -> dict[str, GivenParameter]:
-        """Return the parameters that a node is given, by their names.
+        """Return the parameters that are given to a node, by their names.
 
         Args:
             node: its own name.
-            namespace: of the program's nodes, without slashes at its ends.
+            namespace: that of the program's nodes, without slashes at its ends.
             main: whether it is the main one, which launch knows by another name.
         """
         full = [f"/{namespace}/{self.name_of(node, main=main)}"]
@@ -87,26 +87,26 @@ class RosArguments:
 
     @property
     def words(self) -> list[str]:
-        """What a context is initialised with.
+        """The arguments with which a context is initialised.
 
-        The console belongs to the command; what nodes log goes to /rosout and to the log files, unless
-        ``--enable-stdout-logs`` is given.
+        The console belongs to the command; nodes log to /rosout and to log files, unless ``--enable-stdout-logs`` is
+        given.
         """
         return [BEGIN, "--disable-stdout-logs", *(word for rule in self.rules for word in rule)]
 
     @property
     def command_line(self) -> list[str]:
-        """The words that say the same to another program."""
+        """The same arguments as words for another program."""
         names = (f"{node}:__node:={name}".removeprefix(":") for node, name in self.names.items())
         space = [f"__ns:=/{self.namespace}"] if self.namespace else []
         rules = [*((REMAP, rule) for rule in (*space, *names)), *self.rules]
         return [BEGIN, *(word for rule in rules for word in rule), END] if rules else []
 
     def checked(self) -> RosArguments:
-        """Return itself, where rcl takes the words; ROS must be usable.
+        """Return itself if rcl accepts the words; ROS must be usable.
 
         Raises:
-            RosArgumentsError: it does not.
+            RosArgumentsError: rcl refuses them.
         """
         from rclpy.utilities import remove_ros_args
 
@@ -125,7 +125,7 @@ def split_arguments(argv: Sequence[str], environ: Mapping[str, str] = os.environ
     """Return a command line without its ROS arguments, and these.
 
     Raises:
-        RosArgumentsError: an unknown option, one without its value, a name that is not one.
+        RosArgumentsError: an unknown option, one without its value, an invalid name.
     """
     words, own, inside = list[str](), list[str](), False
     for word in argv:
@@ -173,7 +173,7 @@ class _Reader:
         )
 
     def _take_name(self, rule: str) -> bool:
-        """Take a rule that names a namespace or a node; FALSE where it is for rcl."""
+        """Store a rule that names a namespace or a node; return False if it is for rcl."""
         source, _, target = rule.partition(":=")
         node, _, what = source.rpartition(":")
         if what == "__ns":

@@ -1,22 +1,20 @@
-"""How far a process speaks in its ROS domain.
+"""The discovery range of a process in its ROS domain, and the set-up of Fast DDS.
 
-ROS itself speaks to the whole subnet, and a rack hands out its sources on ``config``. So the range is this host unless
-ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY or ``--range`` says otherwise (decision). Peers of ROS_STATIC_PEERS
-are reached in any range but ``off``.
+By default ROS reaches the whole subnet, and a rack publishes its sources on ``config``. So the range is this host
+unless ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY or ``--range`` says otherwise (decision). Peers of
+ROS_STATIC_PEERS are reached in any range but ``off``.
 
-How Fast DDS is set up: how often a program announces itself, and which ways a distributed rack's processes take.
+A program announces itself five times at its start, then each 3 s: two that start at the same time may miss each other
+for that long (measured on a quiet host: 2.4 to 3.4 s in half of the tries; 0.4 to 0.8 s with one each 250 ms).
 
-A program announces itself five times while it begins, then each 3 s: two that begin at one time may miss each other for
-so long (measured on a quiet host: 2.4 to 3.4 s in half of the tries; 0.4 to 0.8 s with one each 250 ms).
+The processes of a distributed rack communicate by UDP, not by shared memory. They may be killed and started again, and
+shared memory does not support that: a restarted process gets the port of the killed one, which the others repair at
+the same time, each on its own, so that some send to a segment that no process reads; or one waits for ever for a lock
+that the killed one held.
 
-The processes of a distributed rack speak over UDP, and not by shared memory. They are made to be killed and started
-again, and shared memory does not bear that: the process that comes back gets the port of the one that was killed, which
-the others repair at the same time, each for itself, so that some send to a segment that nobody reads from then on; or
-one waits for ever for a lock that the killed one held.
-
-UDP drops what comes while a process is held up and its socket is full: the sockets are as large as the kernel allows,
-and writers tell each 100 ms what they have sent, so that what is missing is sent again (measured with seven processes
-on two cores: 1 % of the datagrams dropped, and scans of up to 2 s ago seen as the latest, without either).
+UDP drops what arrives while a process is held up and its socket is full: the sockets are as large as the kernel allows,
+and writers announce each 100 ms what they have sent, so that missing messages are sent again (measured with seven
+processes on two cores: 1 % of the datagrams dropped, and scans of up to 2 s ago seen as the latest, without either).
 """
 
 from __future__ import annotations
@@ -36,7 +34,7 @@ _LOOPBACK, _NETWORK, _SOON = (
 
 
 def announce_soon() -> None:
-    """Let this process announce itself each 250 ms, before rclpy is initialised (decision).
+    """Make this process announce itself each 250 ms; call it before rclpy is initialised (decision).
 
     Profiles that the environment names and other middleware are left as they are.
     """
@@ -45,11 +43,11 @@ def announce_soon() -> None:
 
 
 def avoid_shared_memory() -> None:
-    """Let this process speak over UDP alone, after its range is chosen and before rclpy is initialised (decision).
+    """Make this process use UDP alone; call it with its range chosen, before rclpy is initialised (decision).
 
-    In the range of one host rmw_fastrtps adds shared memory whatever Fast DDS is told. So it is told nothing of a
-    range, and Fast DDS has the loopback alone: no other host is reached. What the environment says of profiles or
-    transports goes first; other middleware, and peers on other hosts, are left as they are.
+    In the range of one host rmw_fastrtps adds shared memory whatever the profile of Fast DDS says. So the range is set
+    to the subnet, and Fast DDS has the loopback alone: no other host is reached. Profiles or transports that the
+    environment names take precedence; other middleware, and peers on other hosts, are left as they are.
     """
     chosen = [os.environ.get(name, "") for name in (_PROFILES, _TRANSPORTS)]
     if any(text not in ("", str(_SOON)) for text in chosen) or not _is_fast_dds():
@@ -67,12 +65,12 @@ def _is_fast_dds() -> bool:
 
 
 def is_on_loopback() -> bool:
-    """Whether this process has the loopback alone, whatever its range says."""
+    """Whether this process uses the loopback alone, whatever its range says."""
     return os.environ.get(_PROFILES) == str(_LOOPBACK)
 
 
 RANGES = ("localhost", "subnet", "off")
-"""What can be chosen; ``off`` finds nobody."""
+"""The ranges to choose from; ``off`` reaches no other process."""
 _OLD = "ROS_LOCALHOST_ONLY"
 _WORDS = {"LOCALHOST": "this host", "SUBNET": "the whole subnet", "OFF": "nobody"}
 
@@ -87,7 +85,7 @@ def choose_range(chosen: str | None) -> None:
 
 
 def is_this_host_alone() -> bool:
-    """Return whether this process reaches nobody on other hosts."""
+    """Return whether this process reaches no other host."""
     if is_on_loopback():
         return True
     local = os.environ.get(_OLD) == "1" or os.environ.get(RANGE, "").upper() == "LOCALHOST"
@@ -95,7 +93,7 @@ def is_this_host_alone() -> bool:
 
 
 def range_text() -> str:
-    """Return in words whom this process reaches."""
+    """Return in words what this process reaches."""
     name = os.environ.get(RANGE, "").upper()
     if os.environ.get(_OLD) == "1":
         return f"this host ({_OLD})"

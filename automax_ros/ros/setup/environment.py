@@ -45,10 +45,10 @@ def prepare(*, may_restart: bool = True, discovery: str | None = None) -> None:
     """Set the environment up for rclpy and check that rclpy and automax_msgs can be imported.
 
     Args:
-        discovery: how far this process speaks (``discovery_range.RANGES``); None leaves it as the environment says,
-            and where that says nothing it is this host (``discovery_range.choose_range``).
+        discovery: the range of this process (``discovery.RANGES``); None keeps that of the environment, or this host
+            if the environment has none (``discovery.choose_range``).
         may_restart: False where the process must not be replaced, such as in a test runner that captures output or in
-            a notebook; troubled surroundings are then an error.
+            a notebook; an unsuitable environment is then an error.
 
     Raises:
         RosUnavailable: something is missing, or would have to be cured by a restart that is not allowed.
@@ -122,7 +122,7 @@ def _restart(changes: dict[str, str]) -> None:
 
 
 def _check_middleware() -> None:
-    """The wheels bring Fast DDS only; a shell prepared for another one asks rclpy for what is not there."""
+    """Check the middleware: the wheels bring Fast DDS only, but the shell may be prepared for another one."""
     name = os.environ.get("RMW_IMPLEMENTATION")
     if name and not (Path(sys.prefix) / "lib" / f"lib{name}.so").exists():
         raise RosUnavailable(f"RMW_IMPLEMENTATION={name} is not installed in {sys.prefix}: unset RMW_IMPLEMENTATION")
@@ -138,7 +138,7 @@ def _check_imports() -> None:
 
 
 def _check_messages() -> None:
-    """After an update of this package the installed automax_msgs may be an older one."""
+    """Check automax_msgs: after an update of this package the installed one may be older."""
     for name, known in message_types().items():
         package, _, short = name.split("/")
         if package == "automax_msgs":

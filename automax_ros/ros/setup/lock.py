@@ -1,4 +1,4 @@
-"""One rack of a name, or one process of each of its seats, in one ROS domain on one host: locks that die with it."""
+"""Locks for one rack of a name, or one process of each seat, in a ROS domain of a host; they end with the process."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from automax_ros.core.user_error import UserError
 from automax_ros.ros.setup.environment import RosUnavailable
 
 MAX_DOMAIN = 232
-"""Beyond it the ports of DDS end."""
+"""The highest ROS domain: above it DDS has no ports."""
 
 
 class LockError(UserError):
@@ -40,12 +40,12 @@ def domain_id() -> int:
 class InstanceLock:
     """Holds the lock while the ``with`` block lasts; the kernel frees it when the process ends, however it ends.
 
-    A process with the whole rack holds the rack alone. One with a ``seat`` of a rack that is distributed shares the
-    rack with those of other seats, and holds its seat alone.
+    A process with the whole rack locks the rack exclusively. One with a ``seat`` of a distributed rack shares the lock
+    of the rack with those of other seats, and locks its seat exclusively.
     """
 
     def __init__(self, namespace: str, domain: int, seat: str | None = None) -> None:
-        """Name the lock; nothing is taken yet."""
+        """Name the lock, without taking it."""
         self._rack, self._seat = f"rack /{namespace} in ROS domain {domain}", seat
         name = f"automax_ros_{os.getuid()}_{domain}_{namespace.replace('/', '.')}"
         self._path = Path(tempfile.gettempdir()) / f"{name}.lock"
@@ -74,7 +74,7 @@ class InstanceLock:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Free the lock, and take its files away."""
+        """Free the lock, and remove its files."""
         self._free()
 
     def _take(self, path: Path, what: str, how: int) -> None:
@@ -86,7 +86,7 @@ class InstanceLock:
 
     @staticmethod
     def _locked(path: Path, what: str, how: int) -> int:
-        """Return the lock file, open and locked: the one that stands at the path, not one that was taken away."""
+        """Return the lock file, open and locked: the one at the path, not one that was removed meanwhile."""
         while True:
             try:
                 file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
@@ -104,9 +104,9 @@ class InstanceLock:
             os.close(file)
 
     def _free(self) -> None:
-        """Take away the files that nobody else holds, while they are locked, and close all."""
+        """Remove the files that no other process holds, while they are locked, and close all."""
         for file, path in self._files:
-            with suppress(OSError):  # others share it, or it is not ours to take away
+            with suppress(OSError):  # others share it, or it is not ours to remove
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 if _stands_at(file, path):
                     path.unlink()
@@ -127,6 +127,6 @@ def _taken(file: int, what: str) -> RackAlreadyRuns:
         holder = os.pread(file, 32, 0).decode("ascii", "replace").strip()
     finally:
         os.close(file)
-    # Those who share a file leave it empty.
+    # Processes that share a file leave it empty.
     by = f" (process {holder})" if holder.isdigit() else " (distributed over several processes)"
     return RackAlreadyRuns(f"{what} runs already{by}: stop it first, or set another ROS_DOMAIN_ID")

@@ -1,11 +1,11 @@
 """Parameters that a command line gives nodes at the start: ``-p`` and ``--params-file``, in their order, the last wins.
 
-rcl gives them to the nodes, too, but tells nobody of a file's key that no node has, nor of a name that no node
-declares: both are lost silently. So they are read here as well, in rcl's words, with their places.
+rcl gives them to the nodes, too, but does not report a file's key that no node has, nor a name that no node declares:
+both are lost silently. So they are read here as well, by rcl's rules, with their places.
 
-- A node's key is its full name, ``/pm1/processor_1``; ``*`` stands for one part of it, ``**`` for any number. One
-  without a slash in front means what ends so: ``processor_1`` (decision: rcl would look for ``/processor_1``).
-- What launch calls the program, ``/plant/NAME`` with ``-r __ns:=/plant -r __node:=NAME``, means its main node.
+- A node's key is its full name, ``/pm1/processor_1``; ``*`` matches one part of it, ``**`` any number. One without a
+  leading slash matches the end of the name: ``processor_1`` (decision: rcl would look for ``/processor_1``).
+- The program's name in launch, ``/plant/NAME`` with ``-r __ns:=/plant -r __node:=NAME``, means its main node.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ _TRUE = frozenset(["y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", 
 _FALSE = frozenset(["n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
 _WHOLE = re.compile(r"[-+]?(0x[0-9a-fA-F]{1,16}|[1-9][0-9]{0,18}|0[0-7]{0,18})")
 _OCTAL = re.compile(r"[-+]?0[0-7]+")
-"""As in C, for rcl is written in it; with an 8 or 9 in it, rcl takes it for a real."""
+"""Octal as in C, in which rcl is written; with an 8 or 9 in it, rcl reads a real."""
 _REAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 
 class RosArgumentsError(UserError):
-    """What stands after ``--ros-args``, a file that it names, or ROS_NAMESPACE cannot be used."""
+    """The words after ``--ros-args``, a file that they name, or ROS_NAMESPACE cannot be used."""
 
 
 @dataclass(frozen=True)
 class GivenParameter:
-    """One parameter as it was given: the key of its nodes, its name, its value, and where it stands."""
+    """One parameter as it was given: the key of its nodes, its name, its value, and its place."""
 
     key: str
     name: str
@@ -52,13 +52,13 @@ class GivenParameter:
 
     @property
     def is_for_all(self) -> bool:
-        """Whether it names no node, so that it may be meant for another program's."""
+        """Whether it names no single node, so that it may be meant for another program."""
         return "*" in self.key
 
     def means(self, node: str) -> bool:
-        """Return whether it is for a node, by its full name."""
+        """Return whether it is for the node with this full name."""
         pattern = self.key if self.key.startswith("/") else f"{_EVERY}/{self.key}"
-        # Each ** once in a row: with many of them a match would take for ever.
+        # Repeated ** count once: with many of them a match would take for ever.
         parts = (part for part, same in groupby(pattern.strip("/").split("/")) for part in _once(part, list(same)))
         return re.fullmatch("".join(_WILD.get(part, f"/{re.escape(part)}") for part in parts), node) is not None
 
@@ -68,7 +68,7 @@ def _once(part: str, same: list[str]) -> list[str]:
 
 
 def parameter_of(rule: str) -> GivenParameter:
-    """Return what a rule ``NAME:=VALUE`` or ``NODE:NAME:=VALUE`` gives.
+    """Return the parameter of a rule ``NAME:=VALUE`` or ``NODE:NAME:=VALUE``.
 
     Raises:
         RosArgumentsError: it cannot be read.
@@ -83,7 +83,7 @@ def parameter_of(rule: str) -> GivenParameter:
 
 
 def parameters_of(path: Path) -> list[GivenParameter]:
-    """Return what a file of parameters gives.
+    """Return the parameters of a file.
 
     Raises:
         RosArgumentsError: it cannot be read, or has too many.

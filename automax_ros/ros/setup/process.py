@@ -1,11 +1,7 @@
-"""This program in the ROS graph: its context, and the executor that serves all its nodes on a thread of its own.
-
-A program's own part in the ROS graph.
-
-The executor that serves all nodes of one process.
+"""This program in the ROS graph: its context, and the executor that serves all its nodes on a separate thread.
 
 EventsExecutor receives a message in a tenth of the time that SingleThreadedExecutor takes, but in some installations it
-dispatches nothing. So it is tried once at the start, and replaced where it fails the trial.
+dispatches nothing. So it is tried once at the start, and replaced if the trial fails.
 """
 
 from __future__ import annotations
@@ -31,7 +27,7 @@ _MOST_TOLD = 400
 
 
 def joined_context(arguments: RosArguments = NO_ARGUMENTS) -> Context:
-    """Return a context that has joined the graph; whoever asks shuts it down.
+    """Return a context that has joined the graph; the caller shuts it down.
 
     Raises:
         RosUnavailable: ROS cannot be initialised.
@@ -48,10 +44,10 @@ def joined_context(arguments: RosArguments = NO_ARGUMENTS) -> Context:
 
 
 def _try_security(context: Context) -> None:
-    """Make a node, which is when DDS reads keys, and refuses to where it was built without security.
+    """Create a node, so that DDS reads the keys, which fails if it was built without security.
 
     Raises:
-        RuntimeError: it refuses.
+        RuntimeError: it fails.
     """
     Node("security_check", context=context, enable_rosout=False, start_parameter_services=False).destroy_node()
 
@@ -59,9 +55,9 @@ def _try_security(context: Context) -> None:
 _TRIAL_PERIOD_S = 0.001
 _TRIAL_LIMIT_S = 0.2
 _ANSWER_S = 0.5
-"""An executor that has not begun a task after this time is not spun, or by the thread that asks."""
+"""An executor that has not begun a task after this time is not spun, or is spun by the waiting thread."""
 _PASS_S = 10.0
-"""Longest wait for one that is spun: it may be at a long callback."""
+"""Longest wait for an executor that is spun: it may be in a long callback."""
 
 
 def make_executor(context: Context) -> Any:
@@ -81,7 +77,7 @@ def make_executor(context: Context) -> Any:
 
 
 def dispatches(executor: Any, context: Context) -> bool:
-    """Return whether an executor carries out the callback of a timer that is due."""
+    """Return whether an executor calls the callback of a timer that is due."""
     # A service of rclpy's own would outlive its node in the graph.
     quiet = [Parameter("start_type_description_service", value=False)]
     node = Node(
@@ -109,13 +105,13 @@ def dispatches(executor: Any, context: Context) -> bool:
 
 
 def take_out(executor: Any, nodes: Iterable[Node], *, spun: bool = True) -> None:
-    """Take nodes out of an executor, and wait until a thread that spins it has let go of them: they may be destroyed.
+    """Remove nodes from an executor, and wait until a thread that spins it no longer uses them: they may be destroyed.
 
-    Nothing is waited for where nobody spins it, which takes half a second to see unless ``spun`` says so.
+    If no thread spins it there is no wait, but finding that out takes half a second unless ``spun`` is False.
 
-    rclpy's executors go on with the nodes that they have found at the beginning of a pass, and what is destroyed
-    meanwhile ends their thread by ``InvalidHandle``. A task is begun in a pass that found the nodes before or after
-    they were taken out; a second one, made when the first is done, in a later pass.
+    rclpy's executors use the nodes that they found at the beginning of a pass, and a node that is destroyed meanwhile
+    ends their thread by ``InvalidHandle``. A task is begun in a pass that found the nodes before or after they were
+    removed; a second task, created when the first is done, in a later pass.
     """
     for node in nodes:
         executor.remove_node(node)
@@ -134,7 +130,7 @@ _SPIN_S = 0.1
 
 
 class RosProcess:
-    """A context and an executor of this program's own; ``close`` in any case."""
+    """The context and the executor of this program; always call ``close``."""
 
     def __init__(self, arguments: RosArguments = NO_ARGUMENTS) -> None:
         """Initialise ROS for this process; nothing is served before ``spin``.
@@ -149,18 +145,18 @@ class RosProcess:
         self._rests = False
 
     def spin(self, guard: RequestGuard) -> None:
-        """Begin to serve the nodes; ``guard`` is told what fails."""
+        """Start serving the nodes; ``guard`` reports failures."""
         self._guard, self._rests = guard, False
         self._thread = threading.Thread(target=self._spin, name="executor", daemon=True)
         self._thread.start()
 
     @contextmanager
     def resting(self) -> Iterator[None]:
-        """Serve nothing while the block lasts: nodes come and go only then.
+        """Serve nothing inside the block: nodes may be added and removed only there.
 
-        Where nodes have gone another executor serves those that stay: EventsExecutor crashes where it is spun with
-        events of publishers that have left it, for it lets go of the last one without the interpreter's lock
-        (https://github.com/ros2/rclpy/issues/1644). They come when other processes leave the graph just then.
+        If nodes were removed, a new executor serves the others: EventsExecutor crashes if it is spun with events of
+        publishers that have left it, because it releases the last one without the interpreter's lock
+        (https://github.com/ros2/rclpy/issues/1644). Such events occur when other processes leave the graph just then.
         """
         spun = self._thread is not None
         self._rest()
@@ -175,7 +171,7 @@ class RosProcess:
                 self.spin(self._guard)
 
     def close(self) -> None:
-        """Leave the graph, once all nodes have."""
+        """Leave the graph, once all nodes have left."""
         self._rest()
         self.executor.shutdown()
         self.context.try_shutdown()

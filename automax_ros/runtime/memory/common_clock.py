@@ -37,7 +37,7 @@ class CommonClock:
     """The clock of one rack. It changes at the instant of the write that turns it on or off, before scans."""
 
     def __init__(self, scheduler: Scheduler, memory: CommonMemory, fault: Fault) -> None:
-        """Begin with a clock that nobody drives."""
+        """Create a clock that no module drives."""
         self._scheduler, self._memory, self._fault = scheduler, memory, fault
         self._enables: list[_Enable] = []
         self._watchers: list[Callable[[], None]] = []
@@ -51,7 +51,7 @@ class CommonClock:
 
     @property
     def next_ns(self) -> int:
-        """The end of the interval that is under way: the first one begins when the clock is turned on.
+        """The end of the present interval: the first one begins when the clock is turned on.
 
         Raises:
             ValueError: the clock does not run.
@@ -62,16 +62,16 @@ class CommonClock:
         return self.since_ns + (passed + 1) * CLOCK_PERIOD_NS
 
     def add_enable(self, module: str, view: int, register: int) -> None:
-        """Let a module drive the clock by ``ENABLE_BIT`` of a register of its bank ``view``."""
+        """Register a module that drives the clock by ``ENABLE_BIT`` of a register of its bank ``view``."""
         self._enables.append(_Enable(module, view, register))
         self._memory.watch(view, register, self._look_soon)
 
     def watch(self, changed: Callable[[], None]) -> None:
-        """Call ``changed`` when the clock has begun or ended to run."""
+        """Call ``changed`` when the clock has started or stopped."""
         self._watchers.append(changed)
 
     def resume(self, since_ns: int | None) -> None:
-        """Take over since when the clock runs, with the memory of that time; nobody is told."""
+        """Restore the time since which the clock runs, to match restored memory; no watcher is called."""
         self.since_ns = since_ns
         if bool(self._drivers()) is not self.runs:
             self._look_soon()
@@ -86,7 +86,7 @@ class CommonClock:
         return list(dict.fromkeys(set_bits))
 
     def _look_soon(self) -> None:
-        """Look at the bits once the write that may have changed one is complete, still at this instant."""
+        """Check the bits once the write that may have changed one is complete, still at this instant."""
         if not self._looks:
             self._looks = True
             self._scheduler.at(self._scheduler.now_ns, EventKey(EventClass.IO, 0, ""), self._look)

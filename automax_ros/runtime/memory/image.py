@@ -1,4 +1,4 @@
-"""An image of common memory: a value for every view and element, with words and bits of registers kept in step."""
+"""An image of common memory: a value for every view and element, with words and bits of registers kept consistent."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from automax_ros.runtime.memory.views import CellLatch, LatchPlan, ViewSpec, lat
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Image:
-    """The values of all views. What writes it, and what a write means besides, is the business of its subclasses."""
+    """The values of all views. Writes, and their effects, are defined by subclasses."""
 
     def __init__(self, views: Sequence[ViewSpec]) -> None:
-        """Make the image as it is at installation: everything 0 (2.4.5)."""
+        """Create the image as at installation: everything 0 (2.4.5)."""
         self.specs = tuple(views)
         self.now_ns = 0
         self.registers = RegisterMap(self.specs)
@@ -43,7 +43,7 @@ class Image:
         return plan(self._cells)
 
     def latching(self, plan: LatchPlan) -> Callable[[], Latched]:
-        """Return what does the same as ``latch`` of a plan in one call: cells stay the same list."""
+        """Return a function that does the same as ``latch`` of a plan: ``_cells`` stays the same list."""
         return CellLatch(plan, self._cells)
 
     def read_now(self, view: int, element: int = 0) -> Value:
@@ -65,7 +65,7 @@ class Image:
         return entries
 
     def load_image(self, entries: Iterable[tuple[int, int, Value]]) -> None:
-        """Take over an image without logging it: the start of a replay or of a late joiner."""
+        """Load an image without logging it, as at the start of a replay or of a late joiner."""
         for view, element, value in entries:
             self._put(view, element, value)
 

@@ -1,11 +1,11 @@
-"""Common memory as it lives in a rack: the four memory operations, forcing, and the ordered write log.
+"""The common memory of a running rack: the four memory operations, forcing, and the ordered write log.
 
 - ``latch``: copies of simple views at the start of a scan;
-- ``commit``: what a scan's blocks changed, at END;
+- ``commit``: the values that a scan's blocks changed, at END;
 - ``read_now`` and ``write_now``: actual memory, for BASIC statements, arrays, REALs and strings.
 
-A force sits on the view: latch and read_now return it, writes are dropped. Every write that takes effect is an entry of
-the write log, if anybody has asked for the log.
+A force applies to a view: latch and read_now return its value, writes are dropped. Every write that takes effect is an
+entry of the write log, if the log is kept.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ FORCING = "FORCINGSTATUS@"
 class CommonMemory(Image):
     """The common variables and module registers of one rack.
 
-    ``now_ns`` is the time that entries of the write log carry; whoever runs tasks or applies writes sets it.
+    ``now_ns`` is the time of entries in the write log; code that runs tasks or applies writes sets it.
     """
 
     def __init__(self, views: Sequence[ViewSpec]) -> None:
-        """Make the memory as it is at installation: everything 0, nothing forced."""
+        """Create the memory as at installation: everything 0, nothing forced."""
         super().__init__(views)
         self._sequence = 0
         self._forced: set[tuple[int, int]] = set()
@@ -41,35 +41,35 @@ class CommonMemory(Image):
         self._log: list[WriteGroup] | None = None
         self._causes: list[Write] | None = None
         self._plain = [not spec.is_array and view not in self._shared for view, spec in enumerate(self.specs)]
-        """Whether a write of a view writes its cell and nothing else."""
+        """Whether a write to a view changes only its cell."""
         self._watched: dict[tuple[int, int], list[Callable[[], None]]] = {}
         self._gate = array("q", (1, 0))
         self.accesses: dict[int, Callable[[], None]] = {}
-        """Who is told of each access that a scan in modeled time makes to a view: see ``watch_accesses``."""
+        """The functions to call for each access to a view by a scan in modeled time: see ``watch_accesses``."""
 
     @property
     def sequence(self) -> int:
-        """How many writes have taken effect: the number of the last one in the write log."""
+        """The number of writes that have taken effect: that of the last one in the write log."""
         return self._sequence + self._gate[1]
 
     def committing(self) -> CellCommit | None:
-        """Return where native scans may store what blocks changed, as ``commit`` would; None: ``commit`` is overridden.
+        """Return where native scans may store changed values, as ``commit`` would; None if ``commit`` is overridden.
 
-        They may while nothing is forced and nobody has asked for the log, which needs to know of each value.
+        They may while nothing is forced and no log is kept, since the log needs each value.
         """
         overridden = type(self).commit is not CommonMemory.commit
         return None if overridden else CellCommit(self._cells, self._plain, self._gate)
 
     def _set_gate(self) -> None:
-        """Let native scans store values themselves from now on, or not, and count those that they have stored."""
+        """Allow native scans to store values themselves, or forbid it, and count those that they have stored."""
         gate = self._gate
         self._sequence += gate[1]
         gate[0], gate[1] = not self._forced and self._log is None and self._causes is None, 0
 
     def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
-        """Write what a scan's blocks changed: pairs of view and value, already within the view's type.
+        """Write the values that a scan's blocks changed: pairs of view and value, already within the view's type.
 
-        Whoever asks for the log sees ``changes`` itself: it may not be changed any more.
+        The log refers to ``changes`` itself: it must not be changed any more.
         """
         if self._forced or self._causes is not None:
             self._commit_each(changes, writer)
@@ -77,7 +77,7 @@ class CommonMemory(Image):
         plain, cells = self._plain, self._cells
         for view, value in changes:
             if not plain[view]:
-                self._commit_each(changes, writer)  # those before it once more: nothing else depends on a plain cell
+                self._commit_each(changes, writer)  # earlier ones again: nothing else depends on a plain cell
                 return
             cells[view] = value
         first = self._sequence + 1
@@ -104,7 +104,7 @@ class CommonMemory(Image):
         self._store(view, element, self.accepted(view, value, element), writer, WriteKind.OUTSIDE)
 
     def accepted(self, view: int, value: Value, element: int = 0) -> Value:
-        """Return a value from outside as an element of the variable would hold it; nothing is written.
+        """Return a value from outside as an element of the variable would store it, without writing it.
 
         Raises:
             MemoryValueError: the value does not fit the variable's type, or the element does not exist.
@@ -138,9 +138,9 @@ class CommonMemory(Image):
             self._forces_changed(writer)
 
     def hold(self, forced: Iterable[tuple[int, int]], under: Iterable[tuple[int, int, Value]] = ()) -> None:
-        """Take over which values are forced, as ``load_image`` takes over the values: nothing is logged.
+        """Restore which values are forced, as ``load_image`` restores the values: nothing is logged.
 
-        ``under`` is what ``under_forces`` gave.
+        ``under`` is what ``under_forces`` returned.
         """
         self._forced = set(forced)
         self._set_gate()
@@ -151,11 +151,11 @@ class CommonMemory(Image):
 
     @property
     def forced(self) -> frozenset[tuple[int, int]]:
-        """What is forced: pairs of view and element."""
+        """The forced values: pairs of view and element."""
         return frozenset(self._forced)
 
     def note_locals(self, writer: int = 0, *, forced: bool, told: bool = True) -> None:
-        """Take over whether variables of tasks are forced; unless ``told``, FORCINGSTATUS@ shows it already."""
+        """Note whether variables of tasks are forced; ``told`` is False if FORCINGSTATUS@ shows it already."""
         self._locals_forced = forced
         if told:
             self._forces_changed(writer)
@@ -165,7 +165,7 @@ class CommonMemory(Image):
         return (view, 0) in self._forced
 
     def under_force(self, view: int) -> Value:
-        """Return what a simple view would hold if no force held it: the last write that reached memory, though dropped.
+        """Return the value of a simple view without its force: the last write that reached memory, though dropped.
 
         What a block would write is dropped in its scan already, so it does not count (decision).
         """
@@ -173,7 +173,7 @@ class CommonMemory(Image):
 
     @property
     def under_forces(self) -> list[tuple[int, int, Value]]:
-        """What forced values would be without the forces: view, element, value."""
+        """The values of forced views without their forces: view, element, value."""
         return [(*key, value) for key, value in sorted(self._under.items())]
 
     def watch_forces(self, changed: Callable[[], None]) -> None:
@@ -181,9 +181,9 @@ class CommonMemory(Image):
         self._force_watchers.append(changed)
 
     def watch(self, bank: int, register: int, written: Callable[[], None]) -> None:
-        """Call ``written`` whenever a register of a module is written, by itself or through a point.
+        """Call ``written`` whenever a register of a module is written, directly or through a point.
 
-        It may do no more than post an event, since the write may be one of several.
+        It may only post an event, since the write may be one of several.
         """
         self._watched.setdefault((bank, register), []).append(written)
 
@@ -195,13 +195,13 @@ class CommonMemory(Image):
                 self.accesses[view] = accessed
 
     def keep_log(self) -> None:
-        """Begin to keep the write log; whoever asks must ``take_writes`` or ``drain`` it."""
+        """Begin to keep the write log; the caller must ``take_writes`` or ``drain`` it."""
         if self._log is None:
             self._log = []
             self._set_gate()
 
     def take_writes(self) -> list[WriteGroup]:
-        """Return what was logged since it was last taken, oldest first."""
+        """Return the groups logged since the last call, oldest first."""
         groups = self._log
         if not groups:
             return []
@@ -213,23 +213,23 @@ class CommonMemory(Image):
         return [entry for group in self.take_writes() for entry in group.entries()]
 
     def keep_causes(self) -> None:
-        """Begin to keep what was written by name, without what follows from it on views of the same registers.
+        """Begin to keep the writes of named views, without their consequences on views of the same registers.
 
-        Whoever asks must ``take_causes``.
+        The caller must ``take_causes``.
         """
         if self._causes is None:
             self._causes = []
             self._set_gate()
 
     def take_causes(self) -> list[Write]:
-        """Return these writes since they were last taken, oldest first."""
+        """Return these writes since the last call, oldest first."""
         causes, self._causes = self._causes or [], None if self._causes is None else []
         return causes
 
     def clear(self, writer: int = 0, *, keep_non_volatile: bool = True, kept: Container[tuple[int, int]] = ()) -> None:
-        """Set volatile variables to 0, except what is forced: STOP ALL and system restart (2.4.5).
+        """Set volatile variables to 0, except forced ones: STOP ALL and system restart (2.4.5).
 
-        ``kept`` are views and elements that their module keeps, such as inputs. FORCINGSTATUS@ still tells the truth.
+        ``kept`` are views and elements that their module keeps, such as inputs. FORCINGSTATUS@ stays correct.
         """
         for view, spec in enumerate(self.specs):
             if spec.name == FORCING or (spec.non_volatile and keep_non_volatile):
@@ -239,7 +239,7 @@ class CommonMemory(Image):
                     self._store(view, element, spec.type.zero, writer, WriteKind.OUTSIDE)
 
     def _forces_changed(self, writer: int) -> None:
-        """Keep the pre-defined FORCINGSTATUS@ TRUE while anything is forced (2.4.6), and tell who watches."""
+        """Keep the pre-defined FORCINGSTATUS@ TRUE while anything is forced (2.4.6), and call the watchers."""
         view, forced = self._index.get(FORCING), bool(self._forced) or self._locals_forced
         if view is not None and self._cells[view] is not forced:
             self._store(view, 0, forced, writer, WriteKind.OUTSIDE)
@@ -254,7 +254,7 @@ class CommonMemory(Image):
             if view in self._shared:
                 value = self.registers.keeping(view, element, value, self._forced, self.read_now)
         entries = self._spread(view, element, value) if view in self._shared else None
-        # Written out rather than by ``_put``: every write of every scan comes through here.
+        # Written out instead of ``_put``: every write of every scan passes here.
         array = self._arrays[view]
         if array is None:
             self._cells[view] = value
@@ -266,7 +266,7 @@ class CommonMemory(Image):
         if self._causes is not None:
             self._causes.append(Write(self._sequence, self.now_ns, writer, kind, view, element, value))
         if entries:
-            # What shares registers with a forced view is not forced itself.
+            # A view that shares registers with a forced one is not forced itself.
             told = WriteKind.OUTSIDE if kind in (WriteKind.FORCE, WriteKind.RELEASE) else kind
             for other, place, shown in entries:
                 self._put(other, place, shown)
@@ -282,6 +282,6 @@ class CommonMemory(Image):
                 told()
 
     def _spread(self, view: int, element: int, value: Value) -> list[tuple[int, int, Value]]:
-        """Return what else a write of a register changes; what is forced stays."""
+        """Return the other changes by a write of a register, except to forced values."""
         changes = self.registers.consequences(view, element, value, self.read_now)
         return [change for change in changes if change[:2] not in self._forced]

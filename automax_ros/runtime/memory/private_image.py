@@ -1,12 +1,10 @@
 """The private image of a module that works on copies of common memory, such as a UDC (S-3006 p. 4-2).
 
-Its tasks latch, commit, read and write here; the module copies chosen views in and out at the instants of its own.
+Its tasks latch, commit, read and write in the image; the module copies chosen views in and out at its own instants.
 
-What the tasks of a UDC work on: the module's local memory for some registers, the dual port itself for all others.
-
-The UDC copies its application registers between local memory and the dual port at instants of its own
-(S-3056 p. 3-50). All other registers its tasks reach in the dual port: blocks through the latch, BASIC statements at
-once (S-3006 p. 4-9).
+``LocalMemory`` is the memory of a UDC's tasks: the module's local memory for its application registers, which the UDC
+copies from and to the dual port at its own instants (S-3056 p. 3-50). Tasks access all other registers in the dual
+port: blocks through the latch, BASIC statements at once (S-3006 p. 4-9).
 """
 
 from __future__ import annotations
@@ -21,15 +19,15 @@ from automax_ros.runtime.memory.views import LatchPlan, ViewSpec, latch_plan
 
 
 class PrivateImage(Image):
-    """Views of a rack as one module's tasks see them. Nothing is logged: only what is copied out is common memory."""
+    """A rack's views as one module's tasks see them. Nothing is logged: only views copied out change common memory."""
 
     def __init__(self, views: Sequence[ViewSpec], common: CommonMemory) -> None:
-        """Make the image as it is at installation, over the memory that it copies from and to."""
+        """Create the image as at installation, for the memory that it copies from and to."""
         super().__init__(views)
         self._common = common
 
     def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
-        """Write what a scan's blocks changed."""
+        """Write the values that a scan's blocks changed."""
         for view, value in changes:
             self.write_now(view, value, writer)
 
@@ -52,7 +50,7 @@ class PrivateImage(Image):
         return self._common.is_forced(view)
 
     def under_force(self, view: int) -> Value:
-        """Return what a simple view holds: no task that asks works on an image (decision)."""
+        """Return the value of a simple view: tasks that need the value under a force do not use an image (decision)."""
         return self.read_now(view)
 
     def watch_forces(self, changed: Callable[[], None]) -> None:
@@ -60,25 +58,25 @@ class PrivateImage(Image):
         self._common.watch_forces(changed)
 
     def copy_in(self, views: Iterable[int]) -> None:
-        """Take over views as common memory has them now."""
+        """Copy views from common memory."""
         self.take(self._elements(views))
 
     def copy_out(self, views: Iterable[int], writer: int) -> None:
-        """Write to common memory what differs there, as commits of ``writer``."""
+        """Write views that differ to common memory, as commits of ``writer``."""
         self.give(self._elements(views), writer)
 
     def take(self, keys: Iterable[tuple[int, int]]) -> None:
-        """Take over single values as common memory has them now; ``keys`` are views with elements."""
+        """Copy single values from common memory; ``keys`` are views with elements."""
         for view, element in keys:
             self._put(view, element, self._common.read_now(view, element))
 
     def take_forced(self) -> None:
-        """Take over what forces hold, with all that shows the same registers."""
+        """Copy forced values, and update all views of the same registers."""
         for view, element in sorted(self._common.forced):
             self._spread(view, element, self._common.read_now(view, element))
 
     def give(self, keys: Iterable[tuple[int, int]], writer: int) -> None:
-        """Write single values to common memory where they differ there, as commits of ``writer``."""
+        """Write single values that differ to common memory, as commits of ``writer``."""
         for view, element in keys:
             value = self.read_now(view, element)
             if value != self._common.read_now(view, element):
@@ -93,7 +91,7 @@ class PrivateImage(Image):
         return [(view, element) for view in views for element in range(self.specs[view].elements)]
 
     def _spread(self, view: int, element: int, value: Value) -> None:
-        """Put a value, and what else shows the same registers."""
+        """Store a value, and update other views of the same registers."""
         entries = list(self.registers.consequences(view, element, value, self.read_now)) if view in self._shared else []
         for entry in ((view, element, value), *entries):
             self._put(*entry)
@@ -103,13 +101,13 @@ class LocalMemory:
     """The memory of a module's tasks: ``image`` for the views in ``local``, common memory for the others."""
 
     def __init__(self, common: CommonMemory, local: Collection[int]) -> None:
-        """Make the local memory as it is at installation."""
+        """Create the local memory as at installation."""
         self.image = PrivateImage(common.specs, common)
         self._common, self._local = common, frozenset(local)
 
     @property
     def now_ns(self) -> int:
-        """The time of what happens next."""
+        """The time of the next access."""
         return self._common.now_ns
 
     @now_ns.setter
@@ -138,7 +136,7 @@ class LocalMemory:
         return self.image.latch(plan)
 
     def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
-        """Write what a scan's blocks changed, at END."""
+        """Write the values that a scan's blocks changed, at END."""
         for change in changes:
             memory = self.image if change[0] in self._local else self._common
             memory.commit([change], writer)
@@ -158,7 +156,7 @@ class LocalMemory:
         return self._common.is_forced(view)
 
     def under_force(self, view: int) -> Value:
-        """Return what a simple view would hold if no force held it."""
+        """Return the value of a simple view without its force."""
         return self._common.under_force(view)
 
     def watch_forces(self, changed: Callable[[], None]) -> None:

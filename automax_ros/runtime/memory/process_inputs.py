@@ -1,7 +1,7 @@
-"""Inputs as the process sets them: a write from outside reaches its register at once, or when that is free again.
+"""Inputs as the process sets them: a write from outside reaches its register at once, or when it is no longer frozen.
 
 The 57C409, 57C411, 57C419 and 57C421 freeze their inputs at an interrupt until the task that waits for it has scanned
-(4.0). What the process does in between is kept, the last of each variable, and shows after that scan.
+(4.0). Writes of the process in between are kept, the last one of each variable, and take effect after that scan.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ Key = tuple[int, int]
 Kept = tuple[int, int, Value, int]
 """A write that waits: view, element, value, writer."""
 Shape = Callable[[Value], Value]
-"""What a register makes of a value from outside."""
+"""Converts a value from outside to that of a register."""
 
 
 class Freezer:
-    """Inputs that freeze together: ``keys`` is all that shows them, ``owed`` the tasks that have not scanned yet."""
+    """Inputs that freeze together: ``keys`` are all their views, ``owed`` the tasks that have not scanned yet."""
 
     def __init__(self, keys: Iterable[Key]) -> None:
-        """Begin with inputs that follow the process."""
+        """Create it with inputs that are not frozen."""
         self.keys = frozenset(keys)
         self.owed: set[str] = set()
         self.kept: dict[Key, tuple[Value, int]] = {}
 
     def state(self) -> dict[str, Any]:
-        """Return who owes a scan, and what waits in its order."""
+        """Return the tasks that owe a scan, and the writes that wait, in order."""
         kept = [[*key, value, writer] for key, (value, writer) in self.kept.items()]
         return {"owed": sorted(self.owed), "kept": kept}
 
@@ -40,22 +40,22 @@ class Freezer:
 class ProcessInputs:
     """Writes of one rack's inputs and other variables from outside its tasks, between scans.
 
-    ``memory`` is what they write. ``frozen`` has what is frozen now: to be asked before ``scanned``, since that comes
-    after every scan.
+    They go to ``memory``. ``frozen`` has the inputs that are frozen now: check it before calling ``scanned``, which is
+    due after every scan.
     """
 
     def __init__(self, memory: CommonMemory, scheduler: Scheduler) -> None:
-        """Begin with inputs that follow the process."""
+        """Create it with inputs that are not frozen."""
         self.memory, self._scheduler = memory, scheduler
         self.frozen: dict[Key, Freezer] = {}
         self._shapes: dict[Key, Shape] = {}
 
     def shape(self, keys: Iterable[Key], shape: Shape) -> None:
-        """Let values from outside pass through a function before they reach a variable."""
+        """Convert values from outside by a function before they reach a variable."""
         self._shapes.update(dict.fromkeys(keys, shape))
 
     def write(self, view: int, element: int, value: Value, writer: int, kind: WriteKind = WriteKind.OUTSIDE) -> None:
-        """Write a value that fits its variable, now or when it is free again."""
+        """Write a value that fits its variable, now or when it is no longer frozen."""
         key = view, element
         if key in self._shapes:
             value = self._shapes[key](value)
@@ -63,7 +63,7 @@ class ProcessInputs:
         if freezer is None:
             self.memory.write_now(view, value, writer, element, kind)
         else:
-            # Last in order, so that a word written after one of its bits wins over it.
+            # Last in order, so that a word written after one of its bits overrides it.
             freezer.kept.pop(key, None)
             freezer.kept[key] = value, writer
 
@@ -76,14 +76,14 @@ class ProcessInputs:
         self.write(view, element, self.memory.accepted(view, value, element), writer)
 
     def freeze(self, freezer: Freezer, tasks: Iterable[str]) -> None:
-        """Take in what the process has done until now, and hold it until all of ``tasks`` have scanned."""
+        """Apply the writes that wait, and freeze the inputs until all of ``tasks`` have scanned."""
         self.free(freezer)
         freezer.owed = set(tasks)
         if freezer.owed:
             self.frozen.update(dict.fromkeys(freezer.keys, freezer))
 
     def scanned(self, task: str) -> bool:
-        """Follow a scan; return whether inputs were freed and have changed."""
+        """Note a scan; return whether inputs are no longer frozen and have changed."""
         changed = False
         for freezer in dict.fromkeys(self.frozen.values()):
             freezer.owed.discard(task)
@@ -92,7 +92,7 @@ class ProcessInputs:
         return changed
 
     def free(self, freezer: Freezer) -> bool:
-        """Let inputs follow the process again, whoever owes a scan; return whether writes have waited."""
+        """End the freezing of inputs, whichever tasks owe a scan; return whether writes were waiting."""
         freezer.owed = set()
         for key in freezer.keys:
             self.frozen.pop(key, None)
@@ -103,10 +103,10 @@ class ProcessInputs:
         return bool(kept)
 
     def load(self, freezer: Freezer, owed: Iterable[str], kept: Iterable[Sequence[object]]) -> None:
-        """Take over a freezer's state.
+        """Restore a freezer's state.
 
         Raises:
-            ValueError: a write that waits is none of its inputs'.
+            ValueError: a write that waits is not one to its inputs.
         """
         self.freeze(freezer, owed)
         for view, element, value, writer in kept:

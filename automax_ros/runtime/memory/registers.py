@@ -1,8 +1,8 @@
-"""Registers of modules in common memory: what a write of one view makes of the others that show the same bits.
+"""Registers of modules in common memory: the effect of a write to one view on others that show the same bits.
 
-A word and its bits alias in actual memory; the latch copies views, so that in a scan they are apart (3.3).
+A word and its bits alias in actual memory; the latch copies views, so in a scan they are independent (3.3).
 
-The backplane: which registers answer at which slot. An empty slot or a missing register is bus error 31.
+``Backplane`` has the registers of each slot. An empty slot or a missing register is bus error 31.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _TWO_WORDS = (DataType.DOUBLE, DataType.REAL)
 
 
 class Part(NamedTuple):
-    """What a write says of one register: the bits of ``mask`` are those of ``bits``."""
+    """The effect of a write on one register: the bits of ``mask`` become those of ``bits``."""
 
     bank: int
     register: int
@@ -34,7 +34,7 @@ class Part(NamedTuple):
 
 
 class RegisterMap:
-    """Which views show which registers. ``views`` are those that share registers with others: points and banks."""
+    """The views of each register. ``views`` are those that share registers with others: points and banks."""
 
     def __init__(self, specs: Sequence[ViewSpec]) -> None:
         """Sort the points of all banks by register."""
@@ -47,9 +47,9 @@ class RegisterMap:
         self.views = frozenset({*self._places, *(place.bank for place in self._places.values())})
 
     def consequences(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> Iterator[Entry]:
-        """Yield what else changes when ``view`` takes ``value``: words of the bank, then the other points, by register.
+        """Yield the other changes by a write of ``value`` to ``view``: words of the bank, then points, by register.
 
-        ``read`` returns what a view holds before the write. Yields no value that is there already.
+        ``read`` returns the value of a view before the write. Values that do not change are not yielded.
         """
         place = self._places.get(view)
         bank = view if place is None else place.bank
@@ -67,7 +67,7 @@ class RegisterMap:
                 yield other, 0, shown
 
     def parts(self, view: int, element: int, value: Value) -> list[Part]:
-        """Return what a write of a point or a register says of the registers that it touches."""
+        """Return the effect of a write to a point or a register on each register that it changes."""
         place = self._places.get(view)
         if place is None:
             return [Part(view, element, _unsigned(value), WORD)]
@@ -84,7 +84,7 @@ class RegisterMap:
         forced: Collection[tuple[int, int]],
         read: Callable[[int, int], Value],
     ) -> Value:
-        """Return what a write leaves where ``view`` is a bank: the bits of forced points stay as they are."""
+        """Return the value that a write stores if ``view`` is a bank: the bits of forced points do not change."""
         for point in self._points.get((view, element), ()):
             if (point, 0) in forced:
                 bit = self._places[point].bit
@@ -93,7 +93,7 @@ class RegisterMap:
         return value
 
     def showing(self, bank: int, registers: Iterable[int]) -> frozenset[tuple[int, int]]:
-        """Return view and element of all that shows one of the registers of a bank: the words, and their points."""
+        """Return view and element of all views of some registers of a bank: the words, and their points."""
         words = [(bank, register) for register in registers]
         return frozenset([*words, *((view, 0) for word in words for view in self._points.get(word, ()))])
 
@@ -111,7 +111,7 @@ class RegisterMap:
         return range(first, first + (2 if self._types[view] in _TWO_WORDS else 1))
 
     def _words(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> dict[int, int]:
-        """Return the registers that a write touches, as 16-bit words without sign."""
+        """Return the registers that a write changes, as unsigned 16-bit words."""
         assert not isinstance(value, str)
         place, kind = self._places.get(view), self._types[view]
         number = _real_bits(value) if place is not None and kind is DataType.REAL else int(value)
@@ -126,7 +126,7 @@ class RegisterMap:
         return {first: number & WORD}
 
     def _shown(self, view: int, words: dict[int, int], read: Callable[[int, int], Value]) -> Value:
-        """Return what a point shows of its registers; ``words`` are those that have just changed."""
+        """Return the value of a point from its registers; ``words`` are those that have just changed."""
         place = self._places[view]
         found = [words.get(number, _unsigned(read(place.bank, number))) for number in self._registers(view)]
         if place.bit is not None:
@@ -153,7 +153,7 @@ def _real_bits(value: int | float) -> int:
 
 
 def _real_of(bits: int) -> float:
-    """Return the REAL that two registers hold; bits that make none show as 0 or as its largest (decision)."""
+    """Return the REAL in two registers; bits that are not one show as 0 or as its largest (decision)."""
     value: float = struct.unpack(">f", bits.to_bytes(4, "big"))[0]
     return 0.0 if math.isnan(value) else stored_real(value)[0]
 
@@ -167,7 +167,7 @@ It is logged, IOREAD% gives 0, IOWRITE writes nothing, and the task goes on (dec
 
 @dataclass(frozen=True)
 class Bank:
-    """The registers of one module: ``view`` is their view in common memory, ``writable`` is what tasks may write."""
+    """The registers of one module: ``view`` is their view in common memory; tasks may write those in ``writable``."""
 
     slot: int
     view: int
@@ -179,11 +179,11 @@ class Backplane:
     """Finds the element of common memory that is a register of a slot."""
 
     def __init__(self, banks: Iterable[Bank] = ()) -> None:
-        """Take the banks of all modules that have registers."""
+        """Store the banks of all modules that have registers."""
         self._banks = {bank.slot: bank for bank in banks}
 
     def bank(self, slot: int) -> Bank | None:
-        """Return the registers in a slot, None where there are none."""
+        """Return the registers in a slot; None if there are none."""
         return self._banks.get(slot)
 
     def readable(self, slot: int, register: int) -> tuple[int, int] | None:

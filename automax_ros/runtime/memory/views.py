@@ -1,6 +1,6 @@
-"""Views of common memory: what memory, tasks, recordings and replays know of a variable, and the four operations on it.
+"""Views of common memory: variables as memory, tasks, recordings and replays use them, and the four operations.
 
-A variable is a view, known by its index in the rack's table of variables. A plain common is a cell of its own. The
+A variable is a view, identified by its index in the rack's table of variables. A plain common has its own cell. The
 registers of a module are one view too, an array of 16-bit words (its bank); an I/O point is a view with a ``Place`` in
 such a bank, so that a word and its bits show the same registers.
 """
@@ -22,9 +22,9 @@ from automax_ros.core.types import DataType, Latched, Value
 
 @dataclass(frozen=True)
 class Place:
-    """Where an I/O point stands: the view of its module's bank, its (first) register, its bit where it is a BOOLEAN.
+    """The place of an I/O point: the view of its module's bank, its (first) register, its bit if it is a BOOLEAN.
 
-    A DOUBLE INTEGER takes two registers, the high word first (57C421 p. 4-4).
+    A DOUBLE INTEGER has two registers, the high word first (57C421 p. 4-4).
     """
 
     bank: int
@@ -34,7 +34,7 @@ class Place:
 
 @dataclass(frozen=True)
 class ViewSpec:
-    """What memory must know of a variable: ``elements`` values of one type, ``length`` of a string."""
+    """The properties of a variable in memory: ``elements`` values of one type, ``length`` of a string."""
 
     name: str
     type: DataType
@@ -58,10 +58,10 @@ class Write(NamedTuple):
 
 
 class WriteGroup:
-    """Entries of the write log that one operation has made: the same instant, writer, kind and element.
+    """Entries of the write log from one operation: the same instant, writer, kind and element.
 
-    ``changes`` are (view, value) in order; nobody may change it. ``sequence`` is that of the first. A scan's commit is
-    one group: it costs no object for each value.
+    ``changes`` are (view, value) in order, not to be modified. ``sequence`` is that of the first. A scan's commit is
+    one group, without an object for each value.
     """
 
     __slots__ = ("changes", "element", "kind", "sequence", "time_ns", "writer")
@@ -84,7 +84,7 @@ class WriteGroup:
 
     @property
     def key(self) -> tuple[int, int, WriteKind]:
-        """Time, writer and kind: neighbours that have them in common travel in one message."""
+        """Time, writer and kind: neighbours with the same key are in one message."""
         return self.time_ns, self.writer, self.kind
 
     def __repr__(self) -> str:
@@ -102,10 +102,10 @@ LatchPlan = Callable[[list[Value]], Latched]
 
 
 class Memory(Protocol):
-    """What a task works on: the four operations, and which views are held by a force.
+    """The memory of a task: the four operations, and which views are held by a force.
 
-    The live memory of a rack, the private image of a module and the memory of a replay each fulfil it. ``now_ns`` is
-    the time of what happens next; whoever runs tasks sets it.
+    The live memory of a rack, the private image of a module and the memory of a replay implement it. ``now_ns`` is the
+    time of the next access; code that runs tasks sets it.
     """
 
     now_ns: int
@@ -123,7 +123,7 @@ class Memory(Protocol):
         ...
 
     def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
-        """Write what a scan's blocks changed, at END: pairs of view and value, already within the view's type."""
+        """Write the values that a scan's blocks changed, at END: (view, value), already within the view's type."""
         ...
 
     def read_now(self, view: int, element: int = 0) -> Value:
@@ -141,7 +141,7 @@ class Memory(Protocol):
         ...
 
     def under_force(self, view: int) -> Value:
-        """Return what a simple view would hold if no force held it."""
+        """Return the value of a simple view without its force."""
         ...
 
     def watch_forces(self, changed: Callable[[], None]) -> None:
@@ -155,7 +155,7 @@ class MemoryValueError(ValueError):
 
 @mypyc_attr(native_class=False)
 class CellLatch(partial[Latched]):
-    """A latch of a plan over ``cells``: native scans, which know the plan's views, read the cells themselves."""
+    """A latch of a plan over ``cells``: native scans, which know the plan's views, read the cells directly."""
 
     __slots__ = ()
 
@@ -167,10 +167,10 @@ class CellLatch(partial[Latched]):
 
 
 class CellCommit(NamedTuple):
-    """Where a commit may go without a call: native scans store what blocks changed into the cells themselves.
+    """Allows a commit without a call: native scans store changed values directly in the cells.
 
-    ``plain`` says of each view whether a write changes its cell and nothing else. ``gate`` is two integers of 64 bits:
-    1 while the cells are all that a commit changes, and how many values were stored in this way, which scans count.
+    ``plain`` says for each view whether a write changes only its cell. ``gate`` is two integers of 64 bits: 1 while a
+    commit changes only cells, and the number of values stored in this way, which scans count.
     """
 
     cells: list[Value]
@@ -179,7 +179,7 @@ class CellCommit(NamedTuple):
 
 
 def latch_plan(views: Sequence[int]) -> LatchPlan:
-    """Return the quickest function that picks views out of the list of cells."""
+    """Return the fastest function that picks views from the list of cells."""
     if not views:
         return _latch_nothing
     if len(views) == 1:
@@ -193,7 +193,7 @@ def _latch_nothing(_: list[Value]) -> Latched:
 
 
 def fitting(spec: ViewSpec, value: Value) -> Value:
-    """Return a value from outside in the variable's own type.
+    """Return a value from outside in the variable's type.
 
     Raises:
         MemoryValueError: wrong kind of value, or out of the type's range.
@@ -207,7 +207,7 @@ def fitting(spec: ViewSpec, value: Value) -> Value:
             return value
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
         if kind is DataType.REAL:
-            # Not contextlib.suppress, which takes longer than the rest: feeds of plants come through here.
+            # Not contextlib.suppress, which takes longer than the rest: feeds of plants pass here.
             try:
                 single, clamped = stored_real(float(value))
             except OverflowError:

@@ -1,1 +1,1 @@
-"""One scan: what it reads and writes, how long it takes, its errors, events and channels."""
+"""One scan: its reads and writes, its duration, its errors, events and channels."""

@@ -1,7 +1,7 @@
 """Channels: queues of messages from any number of tasks to one (J-3675 p. 6-20 to 6-22).
 
 A number is one channel in the whole rack (decision: so tasks of several Processors can use it). The task that reads it
-makes it; it lasts until STOP ALL or the end of power.
+creates it; it lasts until STOP ALL or the end of power.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ MAX_DEPTH = 1000
 Message = tuple[Value, ...]
 
 CHANNEL_VIEWS = {kind: 0xFFFF - place for place, kind in enumerate(DataType)}
-"""The view under which a record keeps what came out of a channel or went in, by the type of the item; no rack has it.
+"""The view under which a record stores items received from a channel or sent to it, by their type; no rack has it.
 
-The element is the channel's number. The outcome of each access stands first, as an INTEGER.
+The element is the channel's number. The outcome of each access precedes its items, as an INTEGER.
 """
 
 
@@ -33,14 +33,14 @@ def item_types(types: str) -> tuple[DataType, ...]:
 
 
 class ChannelAccess(Protocol):
-    """What tasks do with channels: those of a rack, and those of a recording, fulfil it."""
+    """Access of tasks to channels; the channels of a rack and those of a recording implement it."""
 
     def open_reader(self, number: int, types: str, depth: int, reader: str, now_ns: int) -> int:
         """Make a task the reader; return the problem or 0."""
         ...
 
     def open_writer(self, number: int, types: str) -> int:
-        """Return 0, MUST_WAIT while nobody reads the channel, or the problem."""
+        """Return 0, MUST_WAIT while no task reads the channel, or the problem."""
         ...
 
     def receive(self, number: int, types: str, reader: str, now_ns: int) -> tuple[Message, int]:
@@ -48,7 +48,7 @@ class ChannelAccess(Protocol):
         ...
 
     def send(self, number: int, types: str, message: Message, now_ns: int) -> int:
-        """Add a message; return 0, MUST_WAIT where there is no room, or the problem."""
+        """Add a message; return 0, MUST_WAIT if the channel is full, or the problem."""
         ...
 
 
@@ -63,17 +63,18 @@ class Channel:
 
 
 class Channels:
-    """The channels of a rack, and who waits for them."""
+    """The channels of a rack, and the tasks that wait for them."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Create it without channels."""
         self._all: dict[int, Channel] = {}
         self._waiting: list[tuple[Suspension, int, Wake]] = []
 
     def open_reader(self, number: int, types: str, depth: int, reader: str, now_ns: int) -> int:
         """Make a task the reader; return the problem or 0.
 
-        A task that opens its channel again, alike, finds its messages there; otherwise they are lost (decision).
+        A task that opens its channel again with the same types and depth keeps its messages; otherwise they are lost
+        (decision).
         """
         if not 1 <= depth <= MAX_DEPTH:
             return WRONG_DEPTH
@@ -87,7 +88,7 @@ class Channels:
         return 0
 
     def open_writer(self, number: int, types: str) -> int:
-        """Return 0, MUST_WAIT while nobody reads the channel, or the problem."""
+        """Return 0, MUST_WAIT while no task reads the channel, or the problem."""
         known = self._all.get(number)
         if known is None:
             return MUST_WAIT
@@ -107,7 +108,7 @@ class Channels:
         return message, 0
 
     def send(self, number: int, types: str, message: Message, now_ns: int) -> int:
-        """Add a message; return 0, MUST_WAIT where there is no room, or the problem."""
+        """Add a message; return 0, MUST_WAIT if the channel is full, or the problem."""
         known = self._all.get(number)
         if known is None:
             return MUST_WAIT
@@ -120,15 +121,15 @@ class Channels:
         return 0
 
     def wait(self, why: Suspension, number: int, wake: Wake) -> None:
-        """Go on with ``wake`` when what made a task wait may have changed."""
+        """Call ``wake`` when the cause of a task's wait may have changed."""
         self._waiting.append((why, number, wake))
 
     def forget(self, wake: Wake) -> None:
-        """Wait no longer."""
+        """Cancel a wait."""
         self._waiting = [entry for entry in self._waiting if entry[2] != wake]
 
     def clear(self) -> None:
-        """Forget all channels: STOP ALL and the end of power (decision)."""
+        """Remove all channels: STOP ALL and the end of power (decision)."""
         self._all.clear()
 
     def state(self) -> tuple[Any, ...]:
@@ -139,7 +140,7 @@ class Channels:
         )
 
     def load(self, state: Sequence[Any]) -> None:
-        """Take over a state."""
+        """Restore a state."""
         self._all = {
             number: Channel(types, depth, reader, deque(map(tuple, messages)))
             for number, types, depth, reader, messages in state

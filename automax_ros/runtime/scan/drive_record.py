@@ -1,7 +1,7 @@
-"""What a record keeps of a drive: what its 57C406 has measured at an interrupt, and what the loop has commanded.
+"""The drive's part of a scan record: the measurement of its 57C406 at an interrupt, and the command of the loop.
 
-Both stand among the reads of the scan's record, under views that no rack has, one whole number an element; a number
-that is the usual one is left out (decision: a drive at rest then takes some five numbers per scan).
+Both are among the reads of the scan's record, under views that no rack has, one whole number per element; a number that
+has its usual value is left out (decision: a drive at rest then takes some five numbers per scan).
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.drive.current_loop.signals import Command, Measured, Pulse
 
 MEASURED_VIEW = 0xFFF0
-"""The view of what was measured; the element is the place in ``Measured``. After it comes the rack time: s, then ns."""
+"""The view of the measurement; the element is the place in ``Measured``. The rack time follows: s, then ns."""
 COMMAND_VIEW = 0xFFEF
-"""The view of what was commanded: first the fields of ``Command`` but the pulses, then three numbers per pulse."""
+"""The view of the command: first the fields of ``Command`` without the pulses, then three numbers per pulse."""
 MEASURED_NAMES = (*Measured._fields, "time s", "time ns")
 COMMAND_NAMES = tuple(name for name in Command._fields if name != "pulses")
 MOST_PULSES = 16
-"""Most gate windows of one command that are told (decision: six SCRs, each as first and as second, are twelve)."""
+"""Most gate windows of one command that are recorded (decision: six SCRs, each as first and as second, are twelve)."""
 MEASURED_NUMBERS = len(MEASURED_NAMES)
 COMMAND_NUMBERS = len(COMMAND_NAMES) + MOST_PULSES * len(Pulse._fields)
 
@@ -33,7 +33,7 @@ _FIRST_PULSE = len(COMMAND_NAMES)
 
 
 def noted_measured(measured: Measured) -> list[Noted]:
-    """Return what is noted of a measurement: its first number always, so that there is something."""
+    """Return the numbers to note of a measurement; the first is always noted, so that there is one."""
     noted: list[Noted] = [(MEASURED_VIEW, 0, measured[0])]
     for place, value in enumerate(measured):
         if place and value != _USUAL[place]:
@@ -42,13 +42,13 @@ def noted_measured(measured: Measured) -> list[Noted]:
 
 
 def noted_time(now_ns: int) -> list[Noted]:
-    """Return what is noted of rack time: the stamp of a scan may be one of the wall clock."""
+    """Return the numbers to note of rack time: the stamp of a scan may be one of the wall clock."""
     seconds, rest = divmod(now_ns, NS_PER_S)
     return [(MEASURED_VIEW, _SECONDS, seconds), (MEASURED_VIEW, _REST, rest)]
 
 
 def noted_command(command: Command) -> list[Noted]:
-    """Return what is noted of a command: its first number always."""
+    """Return the numbers to note of a command; the first is always noted."""
     noted: list[Noted] = []
     for place, value in enumerate(command_numbers(command)):
         if not place or value != (_USUAL_COMMAND[place] if place < _FIRST_PULSE else 0):
@@ -65,7 +65,7 @@ def command_numbers(command: Command) -> list[int]:
 
 
 def measured_of(noted: Iterable[Noted]) -> Measured | None:
-    """Return the measurement that was noted, None where there is none among what is given."""
+    """Return the noted measurement; None if there is none."""
     numbers = dict(_of_view(MEASURED_VIEW, noted))
     if 0 not in numbers:
         return None
@@ -73,13 +73,13 @@ def measured_of(noted: Iterable[Noted]) -> Measured | None:
 
 
 def time_of(noted: Iterable[Noted]) -> int | None:
-    """Return the rack time that was noted in ns, None where there is none among what is given."""
+    """Return the noted rack time in ns; None if there is none."""
     numbers = dict(_of_view(MEASURED_VIEW, noted))
     return numbers[_SECONDS] * NS_PER_S + numbers.get(_REST, 0) if _SECONDS in numbers else None
 
 
 def command_of(noted: Iterable[Noted]) -> Command | None:
-    """Return the command that was noted, None where there is none among what is given."""
+    """Return the noted command; None if there is none."""
     numbers = dict(_of_view(COMMAND_VIEW, noted))
     if not numbers:
         return None

@@ -1,6 +1,6 @@
 """A task's error log: the first, the second and the last entry (J2-3106-1 p. 13-4).
 
-What a task's snapshot holds: its state, a drive's loop where it has one, and its error log.
+``snapshot_layout`` is the layout of a task's snapshot: its state, a drive's loop if it has one, and its error log.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class LogEntry:
         return problem.hardware or None if problem else None
 
     def describe(self) -> str:
-        """Return the entry as a person reads it."""
+        """Return the entry as text for people."""
         problem = PROBLEMS.get(self.problem)
         title = problem.title if problem else "unknown problem"
         hardware = f" (code {self.hardware} on the rack)" if self.hardware else ""
@@ -73,7 +73,7 @@ class ErrorLog:
         return kept
 
     def copy(self) -> ErrorLog:
-        """Return a log of its own with the same entries."""
+        """Return an independent log with the same entries."""
         return ErrorLog(self.first, self.second, self.last, self.count)
 
     def flatten(self) -> list[int]:
@@ -84,7 +84,7 @@ class ErrorLog:
         return numbers
 
     def restore(self, numbers: list[int]) -> None:
-        """Take the log over from ``flatten``'s numbers.
+        """Restore the log from ``flatten``'s numbers.
 
         Raises:
             ValueError: not ten numbers.

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 Wake = Callable[[int], None]
-"""Goes on with what has waited, given the instant in ns."""
+"""Resumes a waiting task, given the instant in ns."""
 
 
 class Event:
-    """One event. A ``set`` before anybody waits is kept until one waits, once (decision).
+    """One event. A ``set`` before any task waits is kept until one waits, once (decision).
 
     ``skipped`` is how often it would have been set just before the last time, had the host not been late.
     """
 
     def __init__(self, name: str) -> None:
-        """Begin with an event that nobody has set and nobody waits for."""
+        """Create an event that is not set and that no task waits for."""
         self.name = name
         self.pending = False
         self.skipped = 0
@@ -23,18 +23,18 @@ class Event:
 
     @property
     def awaited(self) -> bool:
-        """Whether anybody waits for it."""
+        """Whether a task waits for it."""
         return bool(self._waiting)
 
     def set(self, now_ns: int, skipped: int = 0) -> None:
-        """Let all who wait go on, in the order in which they began to wait; without any, keep it for the next."""
+        """Resume all waiting tasks, in the order in which they began to wait; without any, keep it for the next."""
         waiting, self._waiting = self._waiting, []
         self.pending, self.skipped = not waiting, skipped
         for wake in waiting:
             wake(now_ns)
 
     def wait(self, wake: Wake) -> bool:
-        """Wait for the event; return True, with nothing to wait for, if a kept one is used up by this."""
+        """Wait for the event; return True, without waiting, if it was kept, which uses it up."""
         if self.pending:
             self.pending = False
             return True
@@ -42,7 +42,7 @@ class Event:
         return False
 
     def forget(self, wake: Wake) -> None:
-        """Wait no longer."""
+        """Cancel a wait."""
         if wake in self._waiting:
             self._waiting.remove(wake)
 
@@ -51,25 +51,25 @@ class Events:
     """The events of a rack by name; a name that two tasks declare is one event (decision: across all Processors)."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Create it without events."""
         self._all: dict[str, Event] = {}
 
     def event(self, name: str) -> Event:
-        """Return the event of a name."""
+        """Return the event with a name."""
         return self._all.setdefault(name, Event(name))
 
     def clear(self) -> None:
-        """Forget what was set and nobody has waited for: STOP ALL and power (decision)."""
+        """Clear events that were set and that no task has waited for: STOP ALL and power (decision)."""
         for event in self._all.values():
             event.pending = False
 
     @property
     def pending(self) -> tuple[str, ...]:
-        """The names of events that were set and that nobody has waited for, in order."""
+        """The sorted names of events that were set and that no task has waited for."""
         return tuple(sorted(name for name, event in self._all.items() if event.pending))
 
     def load(self, pending: Iterable[str]) -> None:
-        """Take over which events are kept."""
+        """Restore which events are kept."""
         self.clear()
         for name in pending:
             self.event(name).pending = True

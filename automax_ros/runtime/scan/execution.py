@@ -1,4 +1,4 @@
-"""How scans take their time: ideal ones take none; ``processor_time`` has those that take the manual's time."""
+"""The time that scans take: ideal ones take none; ``processor_time`` has those that take the manual's time."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from automax_ros.runtime.scan.scan_record import ScanRecord, Steps
 __all__ = ["IDEAL", "Execution", "IdealExecution", "Job", "Place", "ScanRecord", "Steps"]
 
 Place = Mapping[str, Any]
-"""How far a job is that is under way, in numbers: ``left_ns`` before its next step, what it ``skipped``."""
+"""The progress of a job in numbers: ``left_ns`` before its next step, and what it ``skipped``."""
 
 
 class Job(Protocol):
-    """What a Processor executes: a scan of a task, or what a BASIC task does from one suspension to the next."""
+    """A unit of work for a Processor: a scan of a task, or what a BASIC task does from one suspension to the next."""
 
     @property
     def name(self) -> str:
@@ -27,7 +27,7 @@ class Job(Protocol):
         ...
 
     def whole(self, now_ns: int, skipped: int) -> None:
-        """Execute it at one instant and tell of it; ``skipped`` deadlines were missed before."""
+        """Execute it at one instant and report it; ``skipped`` deadlines were missed before."""
         ...
 
     def steps(self, now_ns: int, skipped: int) -> Steps:
@@ -35,7 +35,7 @@ class Job(Protocol):
         ...
 
     def done(self, record: ScanRecord | None) -> None:
-        """Tell that all steps were made."""
+        """Note that all steps were executed."""
         ...
 
 
@@ -43,7 +43,7 @@ class Execution(Protocol):
     """Executes jobs: at once, or as a Processor has time."""
 
     def begin(self, job: Job, now_ns: int, skipped: int) -> None:
-        """Let a job be executed from now on; it must not be under way."""
+        """Begin to execute a job, which must not be in progress."""
         ...
 
     def busy(self, job: Job) -> bool:
@@ -51,15 +51,15 @@ class Execution(Protocol):
         ...
 
     def drop(self, job: Job) -> None:
-        """Give a job up, wherever it is; nothing is executed by this."""
+        """Abandon a job, at whatever step; nothing is executed by this."""
         ...
 
     def place(self, job: Job) -> Place | None:
-        """Return how far a job is, None where it is not under way."""
+        """Return the progress of a job; None if it is not in progress."""
         ...
 
     def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
-        """Go on with a job from the place where it was; ``steps`` have come as far, None if it had not begun."""
+        """Continue a job from its place; ``steps`` are at this place, None if it had not begun."""
         ...
 
 
@@ -75,14 +75,14 @@ class IdealExecution:
         return False
 
     def drop(self, job: Job) -> None:
-        """Nothing is under way."""
+        """Do nothing: no job is in progress."""
 
     def place(self, job: Job) -> Place | None:  # noqa: ARG002
-        """Return None: nothing is under way."""
+        """Return None: no job is in progress."""
         return None
 
     def resume(self, job: Job, place: Place, steps: Steps | None) -> None:  # noqa: ARG002
-        """Refuse: nothing takes time.
+        """Refuse: no job takes time.
 
         Raises:
             ValueError: always.

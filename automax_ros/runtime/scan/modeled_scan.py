@@ -1,4 +1,4 @@
-"""Executes a scan in steps of modeled time; ``scan_under_way`` has what it works on."""
+"""Executes a scan in steps of modeled time; ``scan_under_way`` has its data."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Stepped(Protocol):
 def scan_in_steps(task: Stepped, now_ns: int, skipped: int, form: ScanSteps | None) -> Steps:
     """Execute one scan of a task in steps: see ``Task.scan_modeled``.
 
-    It stays plain Python, since a generator of machine code that is dropped is not closed: the scan would never end.
+    It is plain Python, because a compiled generator that is dropped is not closed: the scan would never end.
     """
     if task.status is not Status.RUNNING:
         return None

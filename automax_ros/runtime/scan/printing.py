@@ -1,4 +1,4 @@
-"""What PRINT makes of its items."""
+"""The lines that PRINT makes from its items."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from automax_ros.compile.base.functions import text_of
 from automax_ros.core.types import Value
 
 PRINT_ZONE = 14
-"""Columns of a zone of PRINT, to the next of which a comma leads (decision)."""
+"""Columns of a zone of PRINT; a comma advances to the next one (decision)."""
 
 
 def format_print(values: tuple[Value, ...], separators: str) -> str:
-    """Return a line of PRINT: a comma leads to the next zone of 14 columns, a semicolon joins (decision)."""
+    """Return a line of PRINT: a comma advances to the next zone of 14 columns, a semicolon joins (decision)."""
     line = ""
     for value, separator in zip(values, separators, strict=True):
         line += text_of(value)

@@ -11,7 +11,7 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEv
 
 @dataclass(eq=False)
 class _Frame:
-    """A job under way: ``remaining_ns`` of execution before its next step; ``steps`` None before its first."""
+    """A job in progress: ``remaining_ns`` of execution before its next step; ``steps`` is None before its first."""
 
     job: Job
     skipped: int
@@ -23,12 +23,12 @@ class _Frame:
 class ModeledExecution:
     """Executes jobs one at a time: the highest priority first, equals in alphabetical order.
 
-    A job of higher priority suspends a lower one, which goes on after it (PC3000 manual p. 15-2). Equals do not suspend
-    each other (decision: no source tells of time-slicing).
+    A job of higher priority suspends a lower one, which continues after it (PC3000 manual p. 15-2). Equals do not
+    suspend each other (decision: no source tells of time-slicing).
     """
 
     def __init__(self, scheduler: Scheduler, name: str) -> None:
-        """Take the scheduler; ``name`` orders Processors at one instant."""
+        """Store the scheduler; ``name`` orders Processors at one instant."""
         self._scheduler = scheduler
         self._key = EventKey(EventClass.EXECUTE, 0, name)
         self._frames: list[_Frame] = []
@@ -38,7 +38,7 @@ class ModeledExecution:
         self._going = False
 
     def begin(self, job: Job, now_ns: int, skipped: int) -> None:
-        """Let a job be executed as soon as nothing goes before it."""
+        """Execute a job as soon as no other precedes it."""
         frame = _Frame(job, skipped)
         place = self._place_of(frame) if self._frames else 0
         if place:
@@ -54,7 +54,7 @@ class ModeledExecution:
         return bool(self._frames) and self._frame(job) is not None
 
     def drop(self, job: Job) -> None:
-        """Give a job up; what it has written so far stays written. Nothing is executed by this."""
+        """Abandon a job; what it has written so far stays written. Nothing is executed by this."""
         frame = self._frame(job)
         if frame is None:
             return
@@ -64,12 +64,12 @@ class ModeledExecution:
         self._wait(now_ns)
         frame.dropped = True
         if frame.steps is not None:
-            # ValueError: the job gives itself up, in the middle of a step.
+            # ValueError: the job abandons itself, in the middle of a step.
             with contextlib.suppress(ValueError):
                 frame.steps.close()
 
     def place(self, job: Job) -> Place | None:
-        """Return how far a job is, None where it is not under way."""
+        """Return the progress of a job; None if it is not in progress."""
         frame = self._frame(job)
         if frame is None:
             return None
@@ -77,7 +77,7 @@ class ModeledExecution:
         return {"left_ns": frame.remaining_ns - used_ns, "skipped": frame.skipped}
 
     def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
-        """Go on with a job from the place where it was; ``steps`` have come as far, None if it had not begun."""
+        """Continue a job from its place; ``steps`` are at this place, None if it had not begun."""
         now_ns = self._scheduler.now_ns
         self._book(now_ns)
         frame = _Frame(job, place["skipped"], steps, place["left_ns"])
@@ -91,7 +91,7 @@ class ModeledExecution:
         return None
 
     def _place_of(self, frame: _Frame) -> int:
-        """Return where a new job stands among those that are under way or wait."""
+        """Return the place of a new job among those that are in progress or wait."""
         place = 0
         for other in self._frames:
             if _goes_before(frame, other):
@@ -100,14 +100,14 @@ class ModeledExecution:
         return place
 
     def _book(self, now_ns: int) -> None:
-        """Suspend the job that is executed: it has used the time up to now."""
+        """Suspend the job that is being executed: it has used the time up to now."""
         if self._event is not None:
             self._event.cancel()
             self._event = None
             self._frames[0].remaining_ns -= now_ns - self._since_ns
 
     def _go(self, now_ns: int) -> None:
-        """Execute what is first, until it takes time that something else comes into."""
+        """Execute the first job, until it takes time in which another event is due."""
         frames, advance_to, key = self._frames, self._scheduler.advance_to, self._key
         self._going = True
         try:
@@ -138,7 +138,7 @@ class ModeledExecution:
                 self._wait(now_ns)
 
     def _wait(self, now_ns: int) -> None:
-        """Go on with what is first when it has had its time, unless it goes on by itself."""
+        """Post the continuation of the first job after its remaining time, unless jobs are being executed now."""
         if self._frames and not self._going:
             self._since_ns = now_ns
             event = self._spare
@@ -155,7 +155,7 @@ class ModeledExecution:
 
 
 def _goes_before(new: _Frame, other: _Frame) -> bool:
-    """Return whether a new job is executed before one that is under way or waits."""
+    """Return whether a new job is executed before one that is in progress or waits."""
     if new.job.priority != other.job.priority:
         return new.job.priority < other.job.priority
     if new.steps is not None or other.steps is not None:

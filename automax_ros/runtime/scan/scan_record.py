@@ -1,4 +1,4 @@
-"""What a task is doing, and what one of its scans saw and did."""
+"""The status of a task, and the record of one of its scans."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from automax_ros.core.types import Latched, Value
 
 
 class Status(enum.Enum):
-    """What a task is doing."""
+    """The status of a task."""
 
     STOPPED = "stopped"
     RUNNING = "running"
@@ -20,21 +20,21 @@ class Status(enum.Enum):
 _FIELDS = ("commits", "duration_ns", "errors", "latched", "reads", "scan", "skipped", "time_ns", "writes")
 
 _KEPT = {"commits": "_commits", "errors": "_errors", "reads": "_reads", "writes": "_writes"}
-"""Where what is made when it is first asked for is kept."""
+"""The attributes that store lists created on first access."""
 
 
-class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
-    """All that one scan saw and did; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value).
+class ScanRecord:  # noqa: PLW1641  # no hash: it changes during the scan
+    """All inputs and effects of one scan; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value).
 
     ``time_ns`` is the instant of the latch, ``duration_ns`` the time of execution: the host's, or the modeled one from
-    the scan's beginning to its end, the time in which it was suspended included.
+    the scan's beginning to its end, including the time in which it was suspended.
     """
 
     # Not a dataclass: every recorded scan makes one, and that takes twice as long. Few need any of the lists.
     __slots__ = ("_commits", "_errors", "_reads", "_writes", "duration_ns", "latched", "scan", "skipped", "time_ns")
 
     def __init__(self, time_ns: int, scan: int, skipped: int = 0) -> None:
-        """Begin the record of a scan that has seen and done nothing; ``skipped`` deadlines were missed before it."""
+        """Create an empty record; ``skipped`` deadlines were missed before the scan."""
         self.time_ns = time_ns
         self.scan = scan
         self.latched: Latched = ()
@@ -47,21 +47,21 @@ class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
 
     @property
     def reads(self) -> list[tuple[int, int, Value]]:
-        """What was read of actual memory, in order."""
+        """The reads of actual memory, in order."""
         if self._reads is None:
             self._reads = []
         return self._reads
 
     @property
     def writes(self) -> list[tuple[int, int, Value]]:
-        """What was written to actual memory, in order."""
+        """The writes to actual memory, in order."""
         if self._writes is None:
             self._writes = []
         return self._writes
 
     @property
     def commits(self) -> list[tuple[int, Value]]:
-        """What blocks changed."""
+        """The changes by blocks."""
         if self._commits is None:
             self._commits = []
         return self._commits
@@ -93,17 +93,17 @@ class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
         return bool(self._reads) or bool(self._writes)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether another record says the same."""
+        """Return whether another record has the same content."""
         if not isinstance(other, ScanRecord):
             return NotImplemented
         return all(getattr(self, name) == getattr(other, name) for name in _FIELDS)
 
     def __reduce__(self) -> tuple[Callable[..., ScanRecord], tuple[object, ...]]:
-        """Return what makes a copy: a class of machine code has none of its own."""
+        """Return how to make a copy, which a compiled class cannot make otherwise."""
         return _with_fields, tuple(getattr(self, name) for name in _FIELDS)
 
     def __repr__(self) -> str:
-        """Return all of it as text."""
+        """Return the record as text."""
         return f"ScanRecord({', '.join(f'{name}={getattr(self, name)!r}' for name in _FIELDS)})"
 
 
@@ -115,7 +115,7 @@ def _with_fields(*values: object) -> ScanRecord:
 
 
 Steps = Generator[int, int | None, ScanRecord | None]
-"""A scan in steps: yields the ns of execution before each access to actual memory, and is sent the time it is then.
+"""A scan in steps: yields the ns of execution before each access to actual memory, and is sent the time after them.
 
-Sent None, the time is what it was. Returns the record of the scan, if one is kept.
+If it is sent None, the time does not change. It returns the record of the scan, if one is kept.
 """

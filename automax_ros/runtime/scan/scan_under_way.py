@@ -1,8 +1,8 @@
-"""A scan in steps of modeled time that is not whole yet: what it works on, and what it takes to tell it again.
+"""A scan in steps of modeled time that has not ended yet: its data, and what is needed to execute it again.
 
-A scan under way works on a copy of its task's state: until it ends the state of the task is that of its last whole
-scan. Snapshots have that, and a scan that is given up leaves nothing in it (decision: only what it has written to
-memory stays written). It notes what it reads, so that another rack can execute its first part again and go on there.
+Such a scan works on a copy of its task's state: until it ends, the state of the task is that of its last complete scan.
+Snapshots contain that state, and a scan that is abandoned does not change it (decision: only what it has written to
+memory stays written). The scan notes what it reads, so that another rack can execute its first part again and continue.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from automax_ros.runtime.scan.scan_record import ScanRecord
 from automax_ros.runtime.scan.task_io import Call, ScanMemory
 
 Progress = Mapping[str, Any]
-"""How far a scan is, in numbers, texts, lists and mappings."""
+"""The progress of a scan, in numbers, texts, lists and mappings."""
 
 
 class ReplayableReads:
-    """Memory as a scan under way uses it: ``heard`` is all that it was given since it began.
+    """Memory as a scan in progress uses it: ``heard`` are all values that it has read since it began.
 
-    After ``tell`` it gives what an earlier scan was given and writes nothing, until ``live``. ``latched`` are the views
-    that a latch takes.
+    After ``tell`` it returns the values that an earlier scan read and writes nothing, until ``live``. ``latched`` are
+    the views of a latch.
     """
 
     def __init__(self, memory: ScanMemory) -> None:
-        """Take the memory that the task works on."""
+        """Store the memory that the task works on."""
         self._memory = memory
         self._accesses: Mapping[int, Call] = memory.accesses if isinstance(memory, CommonMemory) else {}
         self.latched: Sequence[int] = ()
@@ -42,16 +42,16 @@ class ReplayableReads:
 
     @property
     def now_ns(self) -> int:
-        """The time of what happens next."""
+        """The time of the next access."""
         return self._memory.now_ns if self._told is None else self.latched_ns
 
     def begin(self) -> None:
-        """Begin a scan, which has heard nothing and has not latched: the scan before leaves nothing in its progress."""
+        """Begin a scan, which has not read or latched yet: nothing of the scan before is in its progress."""
         self.heard = []
         self.latched_ns = 0
 
     def tell(self, heard: Sequence[Any], latched_ns: int) -> None:
-        """Give what a scan was given that latched at an instant, in place of what memory holds."""
+        """Return from now on the values read by a scan that latched at an instant, instead of those in memory."""
         self._told, self.latched_ns = iter(heard), latched_ns
 
     def live(self) -> None:
@@ -86,13 +86,13 @@ class ReplayableReads:
         return forced
 
     def hear(self, call: Call) -> Any:
-        """Return what a call outside the task returns, or what it returned when the scan was executed first."""
+        """Return the result of a call outside the task, or its result when the scan was executed first."""
         outcome = call() if self._told is None else next(self._told)
         self.heard.append(outcome)
         return outcome
 
     def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
-        """Write what the scan's blocks changed."""
+        """Write the values that the scan's blocks changed."""
         if self._told is None:
             self._memory.commit(changes, writer)
             self._tell([view for view, _ in changes] if self._accesses else ())
@@ -106,7 +106,7 @@ class ReplayableReads:
             self._tell((view,))
 
     def _tell(self, views: Sequence[int]) -> None:
-        """Tell those who watch it of an access to each of some views."""
+        """Call the watchers of each of some views for an access."""
         if self._accesses:
             for view in views:
                 told = self._accesses.get(view)
@@ -116,9 +116,9 @@ class ReplayableReads:
 
 @dataclass(eq=False)
 class ScanInProgress:
-    """A scan that has begun: ``steps`` counts those it has announced.
+    """A scan that has begun: ``steps`` counts those that it has yielded.
 
-    ``log`` is the error log before it, ``own_errors`` what it has logged itself; None where there is nothing.
+    ``log`` is the error log before it, ``own_errors`` are the errors that it has logged itself; None if there are none.
     """
 
     began_ns: int
@@ -131,7 +131,7 @@ class ScanInProgress:
 
     @property
     def progress(self) -> Progress:
-        """What ``Task.resume_scan`` must be given to go on from here."""
+        """The data with which ``Task.resume_scan`` continues the scan from here."""
         return {
             "began_ns": self.began_ns,
             "latched_ns": self.memory.latched_ns,
@@ -142,11 +142,11 @@ class ScanInProgress:
 
 
 Begun = tuple[ScanInProgress, ScanRecord | None, Generator[int, None, bool]]
-"""A scan that has begun: what it works on, its record if one is kept, and the compiled form that executes it."""
+"""A scan that has begun: its data, its record if one is kept, and the compiled form that executes it."""
 
 
 def add_error(entry: LogEntry, log: ErrorLog, scan: ScanInProgress | None) -> None:
-    """Log an error, as that of a scan under way if there is one."""
+    """Log an error, as that of the scan in progress if there is one."""
     log.add(entry)
     if scan is not None:
         if scan.own_errors is None:
@@ -155,9 +155,9 @@ def add_error(entry: LogEntry, log: ErrorLog, scan: ScanInProgress | None) -> No
 
 
 def cleared_errors(log: ErrorLog, scan: ScanInProgress | None, *, inside: bool) -> ErrorLog:
-    """Return what is left of a log that is cleared, from ``inside`` the scan under way or by the operator.
+    """Return what remains of a log that is cleared, from ``inside`` the scan in progress or by the operator.
 
-    After the operator's clearing there is still what a scan under way logs itself (decision).
+    If the operator clears it, errors that a scan in progress has logged itself remain (decision).
     """
     if scan is None or inside:
         log.clear()

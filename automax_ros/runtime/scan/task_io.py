@@ -1,4 +1,4 @@
-"""What a task's compiled functions touch: common memory, registers, the error log, printed lines."""
+"""Access of a task's compiled functions to common memory, registers, the error log and printed lines."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from automax_ros.runtime.scan.scan_record import ScanRecord
 
 Call = Callable[[], Any]
 Hear = Callable[[Call], Any]
-"""Returns what a call outside the task returns, or what it returned when the scan was executed first."""
+"""Returns the result of a call outside the task, or its result when the scan was executed first."""
 
 
 def at_once(call: Call) -> Any:
-    """Return what a call returns."""
+    """Return the result of a call."""
     return call()
 
 
 class Host(Protocol):
-    """The task that a ``TaskIo`` works for.
+    """The task of a ``TaskIo``.
 
     ``plan`` are the views that a scan latches, ``written`` those that its blocks write; ``present_scan`` is the number
     of the scan that logs errors.
@@ -53,7 +53,7 @@ class Host(Protocol):
 
 
 class ScanMemory(Protocol):
-    """What a scan does with memory: the four operations of ``Memory``."""
+    """The memory of a scan: the four operations of ``Memory``."""
 
     @property
     def now_ns(self) -> int: ...  # noqa: D102
@@ -74,7 +74,7 @@ class ScanMemory(Protocol):
 def register_read(
     backplane: Backplane, read_now: Callable[[int, int], Value], slot: int, register: int
 ) -> tuple[int, int]:
-    """Return a register's word as ``read_now`` has it and 0, or 0 and the bus error of one that does not answer."""
+    """Return a register's word by ``read_now`` and 0, or 0 and the bus error of one that does not answer."""
     place = backplane.readable(slot, register)
     if place is None:
         return 0, BUS_ERROR
@@ -85,7 +85,7 @@ def register_read(
 def register_written(
     backplane: Backplane, write_now: Callable[[int, Value, int], None], slot: int, register: int, value: int
 ) -> int:
-    """Write a register's 16 bits by ``write_now``; return 0, or the bus error of one that does not take it."""
+    """Write a register's 16 bits by ``write_now``; return 0, or the bus error of one that cannot be written."""
     place = backplane.writable(slot, register)
     if place is None:
         return BUS_ERROR
@@ -96,9 +96,9 @@ def register_written(
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class TaskIo:
-    """What a compiled scan touches: common memory through one task, its error log and its printed lines.
+    """Access of a compiled scan to common memory through one task, to its error log and its printed lines.
 
-    The members are bound once, so that a scan pays for no more than the memory itself.
+    The members are bound once, so that a scan costs no more than the memory itself.
     """
 
     def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
@@ -113,11 +113,11 @@ class TaskIo:
         self._backplane, self._hear = task.backplane, hear
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
-        """Write back what blocks changed."""
+        """Write back the values that blocks changed."""
         if not changes:
             return
         common = self._common
-        if common is not None:  # the same, known by its class: a call of machine code
+        if common is not None:  # the same object with its class known: a compiled call
             common.commit(changes, self._writer)
         else:
             self._memory.commit(changes, self._writer)
@@ -127,7 +127,7 @@ class TaskIo:
         self._memory.write_now(view, value, self._writer, element, WriteKind.BASIC)
 
     def forces(self) -> tuple[bool, ...]:
-        """Return which of the commons that blocks write a force holds."""
+        """Return for each common that blocks write whether a force holds it."""
         return tuple(map(self._memory.is_forced, self._task.written))
 
     def log(self, line: int, code: int) -> None:
@@ -156,25 +156,25 @@ class TaskIo:
         return register_read(self._backplane, self.read_now, slot, register)
 
     def io_write(self, slot: int, register: int, value: int) -> int:
-        """Write a register's word; return 0, or the bus error of a register that does not answer or take it."""
+        """Write a register's word; return 0, or the bus error of a register that does not answer or is not writable."""
         return register_written(self._backplane, self.write_now, slot, register, value)
 
     def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG002
-        """Execute the current minor loop of a drive: a task that has none writes no outputs."""
+        """Execute the current minor loop of a drive: a task without one writes no outputs."""
         return None
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class RecordingIo(TaskIo):
-    """The same, noting everything in ``record``."""
+    """The same, with everything noted in ``record``."""
 
     def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
-        """Bind a task and its memory and begin with an empty record."""
+        """Bind a task and its memory, with an empty record."""
         super().__init__(task, memory, hear)
         self.record = ScanRecord(0, 0)
         self.latch = self._latch
         self.read_now = self._read_now
-        self.cell_commit = None  # what is committed is noted
+        self.cell_commit = None  # commits are noted
         self._plan = task.plan
         self._image: Image | None = memory if isinstance(memory, Image) else None
         self._latched = memory.latching(task.plan) if isinstance(memory, Image) else None
@@ -184,7 +184,7 @@ class RecordingIo(TaskIo):
         if image is None or latch is None:
             record.time_ns = self._memory.now_ns
             record.latched = latched = self._memory.latch(self._plan)
-        else:  # the same, known by its class: an attribute of machine code
+        else:  # the same object with its class known: a compiled attribute
             record.time_ns = image.now_ns
             record.latched = latched = latch()
         return latched
@@ -200,7 +200,7 @@ class RecordingIo(TaskIo):
         super().write_now(view, value, element)
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
-        """Write back what blocks changed and note it."""
+        """Write back the values that blocks changed and note them."""
         self.record.commits = changes
         super().commit(changes)
 

@@ -1,4 +1,4 @@
-"""What a tunable holds after it was set (2.4.5)."""
+"""The value of a tunable after it was set (2.4.5)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from automax_ros.language.program import Symbol
 
 
 def tunable_value(symbol: Symbol, name: str, value: object) -> int | float:
-    """Return what a tunable, which ``name`` tells in messages, would hold if it were set to a value.
+    """Return the value that a tunable would have if it were set to ``value``; ``name`` identifies it in messages.
 
     Raises:
         KeyError: it cannot be tuned.

@@ -1,7 +1,7 @@
 """A BASIC task: it runs from one suspension to the next, a burst, and each burst counts as a scan.
 
-Nothing is latched: reads and writes go to actual memory at once. What a burst got out of channels and sent stands among
-the reads of its record (``CHANNEL_VIEWS``), so that the burst can be executed again.
+Nothing is latched: reads and writes access actual memory at once. What a burst receives from channels and sends is
+among the reads of its record (``CHANNEL_VIEWS``), so that the burst can be executed again.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from automax_ros.runtime.scan.task_io import Hear, RecordingIo, ScanMemory, Task
 from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
 
 BURSTS_AT_ONCE = 100
-"""Bursts of one task at one instant; then it goes on at the next tick (decision: so tasks that wake each other cannot
-stop time)."""
+"""Most bursts of one task at one instant; then it continues at the next tick (decision: so tasks that wake each other
+cannot stop time)."""
 _TIMED = (Suspension.END, Suspension.DELAY, Suspension.BUSY)
 _READY, _GOING = -1, -2
-"""A task that goes on at an instant that is known, and one that a Processor executes."""
+"""A task that continues at a known instant, and one that a Processor is executing."""
 
 
 class BasicIo(TaskIo):
-    """What a burst touches."""
+    """Access of a burst to memory and channels."""
 
     def __init__(self, task: BasicTask, memory: ScanMemory, hear: Hear = at_once) -> None:
         """Bind a task, the memory that its bursts work on, and channels."""
@@ -38,7 +38,7 @@ class BasicIo(TaskIo):
         self._channels = task.channels
 
     def start_every(self, period_ns: int) -> None:
-        """Register that the task goes on each period from now (START EVERY)."""
+        """Restart the task each period from now on (START EVERY)."""
         self._hear(lambda: self._basic.start_every(period_ns, self._memory.now_ns))
 
     def open_reader(self, number: int, types: str, depth: int) -> int:
@@ -48,12 +48,12 @@ class BasicIo(TaskIo):
         return outcome
 
     def open_writer(self, number: int, types: str) -> int:
-        """Find a channel; return 0, the problem, or MUST_WAIT while nobody reads it."""
+        """Find a channel; return 0, the problem, or MUST_WAIT while no task reads it."""
         outcome: int = self._hear(lambda: self._channels.open_writer(number, types))
         return outcome
 
     def receive(self, number: int) -> tuple[Message, int]:
-        """Take the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
+        """Receive the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
         types, name = self._basic.types(number), self._basic.name
         received: tuple[Message, int] = self._hear(
             lambda: self._channels.receive(number, types, name, self._memory.now_ns)
@@ -61,14 +61,14 @@ class BasicIo(TaskIo):
         return received
 
     def send(self, number: int, message: Message) -> int:
-        """Put a message into a channel; return 0, the problem, or MUST_WAIT where it is full."""
+        """Send a message to a channel; return 0, the problem, or MUST_WAIT if it is full."""
         types = self._basic.types(number)
         outcome: int = self._hear(lambda: self._channels.send(number, types, message, self._memory.now_ns))
         return outcome
 
 
 class RecordingBasicIo(BasicIo, RecordingIo):
-    """The same, noting everything, the outcomes of channels among the reads."""
+    """The same, with everything noted, the outcomes of channels among the reads."""
 
     def open_reader(self, number: int, types: str, depth: int) -> int:
         """Make the task the reader of a channel and note the outcome."""
@@ -79,14 +79,14 @@ class RecordingBasicIo(BasicIo, RecordingIo):
         return self._noted(number, super().open_writer(number, types))
 
     def receive(self, number: int) -> tuple[Message, int]:
-        """Take a message and note the outcome and its items."""
+        """Receive a message and note the outcome and its items."""
         message, outcome = super().receive(number)
         self._noted(number, outcome)
         self._note_items(number, message)
         return message, outcome
 
     def send(self, number: int, message: Message) -> int:
-        """Put a message into a channel and note the outcome, and the items that went in."""
+        """Send a message to a channel and note the outcome, and the items that were sent."""
         outcome = self._noted(number, super().send(number, message))
         if not outcome:
             self._note_items(number, message)
@@ -106,8 +106,8 @@ class RecordingBasicIo(BasicIo, RecordingIo):
 class BasicTask(Task):
     """A BASIC task in a rack: a ``Task`` whose scans are bursts.
 
-    ``wish`` is what it waits for since the last burst; a timed wish ends at ``wake_ns``, one for an event began there.
-    ``suspended`` is called after each burst, when these are known. ``every`` is period, begin and number of the last
+    ``wish`` is what it waits for since the last burst; a timed wait ends at ``wake_ns``, one for an event began there.
+    ``suspended`` is called after each burst, when these are known. ``every`` is period, start and number of the last
     instant of its START EVERY.
     """
 
@@ -126,7 +126,7 @@ class BasicTask(Task):
         events: Events | None = None,
         channels: ChannelAccess | None = None,
     ) -> None:
-        """Install the task; without ``events`` and ``channels`` it has some of its own."""
+        """Install the task; without ``events`` and ``channels`` it gets its own."""
         self.channels: ChannelAccess = Channels() if channels is None else channels
         self.suspended: Callable[[], None] = _nothing
         super().__init__(
@@ -134,7 +134,7 @@ class BasicTask(Task):
         )
 
     def install(self, compiled: CompiledTask) -> None:
-        """Begin again, with this or another program."""
+        """Install this or another program, as at the beginning."""
         self._files = {item.number: item for item in compiled.program.files}
         self._types = {
             number: "".join(kind.value or "." for kind in item.types) for number, item in self._files.items()
@@ -144,7 +144,7 @@ class BasicTask(Task):
         _ = self.compiled.burst  # compiled here: the first burst of a live rack would be late
 
     def file(self, number: int) -> OpenedFile:
-        """Return what a number after # is."""
+        """Return the file with a number after #."""
         return self._files[number]
 
     def types(self, number: int) -> str:
@@ -153,12 +153,12 @@ class BasicTask(Task):
 
     @property
     def is_done(self) -> bool:
-        """Whether it has come to its END, and does not start again."""
+        """Whether it has reached its END, and does not start again."""
         return self.status is Status.ENDED and self.wish[0] == Suspension.END
 
     @property
     def ready(self) -> bool:
-        """Whether it goes on at an instant that is known: nothing holds it back."""
+        """Whether it continues at a known instant: it waits for nothing."""
         return self.wish[0] == _READY
 
     @property
@@ -167,21 +167,21 @@ class BasicTask(Task):
         return self.wish[0] in _TIMED
 
     def make_ready(self) -> None:
-        """What it waited for is there."""
+        """End its wait."""
         self.wish = (_READY, 0)
 
     def go(self) -> None:
-        """A burst is handed to the Processor."""
+        """Note that a burst is handed to the Processor."""
         self.wish = (_GOING, 0)
 
     def not_before(self, now_ns: int) -> int:
-        """Return when a burst may begin that is wanted now: the next tick after too many of them at one instant."""
+        """Return when a burst that is due now may begin: at the next tick after too many at one instant."""
         if now_ns == self._instant and self._bursts >= BURSTS_AT_ONCE:
             return self._next_tick(now_ns)
         return now_ns
 
     def run(self, now_ns: int = 0) -> ScanRecord | None:
-        """Put the task into RUN: it begins at its first statement, wherever it stopped (J2-3106-1 p. 12-4).
+        """Put the task into RUN: it starts at its first statement, wherever it stopped (J2-3106-1 p. 12-4).
 
         Returns an empty record, as scan 0, if bursts are recorded.
         """
@@ -203,21 +203,21 @@ class BasicTask(Task):
         return record
 
     def start_every(self, period_ns: int, now_ns: int) -> None:
-        """Let it go on each period from now on (START EVERY)."""
+        """Restart it each period from now on (START EVERY)."""
         self.every = (period_ns, now_ns, 0)
 
     def pass_over(self, now_ns: int) -> None:
-        """Leave out the instants of START EVERY up to the present: a burst that is due begins there instead."""
+        """Skip the instants of START EVERY up to the present: a burst that is due begins there instead."""
         if self.wish[0] == Suspension.END and self.every is not None:
             period, begin, last = self.every
             self.every = period, begin, max(last, (now_ns - begin) // period)
 
     def waiting(self) -> list[int]:
-        """Return, as numbers, what it waits for and its START EVERY."""
+        """Return, as numbers, its wait and its START EVERY."""
         return [*self.wish, self.wake_ns, *(self.every or (0, 0, 0)), self._instant, self._bursts]
 
     def wait_again(self, numbers: Sequence[int]) -> None:
-        """Take over what ``waiting`` gave.
+        """Restore what ``waiting`` returned.
 
         Raises:
             ValueError: a BASIC task cannot wait for that.
@@ -260,9 +260,9 @@ class BasicTask(Task):
         self.suspended()
 
     def _next_start(self, now_ns: int) -> int:
-        """Return the next instant of START EVERY; those that a longer run has passed are left out (decision)."""
+        """Return the next instant of START EVERY; instants that passed during a longer run are skipped (decision)."""
         if self.every is None:
-            return now_ns  # a burst that is executed again has no clock
+            return now_ns  # a burst in a replay has no clock
         period, begin, last = self.every
         number = max(last + 1, -((begin - now_ns) // period))
         self.every = period, begin, number
@@ -285,4 +285,4 @@ def awaits(task: Task, event: str) -> bool:
 
 
 def _nothing() -> None:
-    """Nobody wants to know."""
+    """Do nothing."""

@@ -1,9 +1,9 @@
 """The task of a DC drive: its scans begin at the interrupts of a 57C406, and its first block is the current minor loop.
 
-The loop (``drive/cml``) is a part of the task's state: it gets what the 57C406 has measured and what the task has
-latched, and returns a command for the 57C406. Both are noted in the record of a scan (``drive_record``), so the scan
-can be executed again without the drive. The loop's time is that of the latch (decision: in modeled execution a scan
-latches later than its interrupt).
+The loop (``drive/current_loop``) is a part of the task's state: it gets the measurement of the 57C406 and the latch of
+the task, and returns a command for the 57C406. Measurement and command are noted in the record of a scan
+(``drive_record``), so the scan can be executed again without the drive. The loop's time is that of the latch (decision:
+in modeled execution a scan latches later than its interrupt).
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from automax_ros.runtime.scan.task_io import Hear, RecordingIo, ScanMemory, Task
 from automax_ros.runtime.tasks.task import Task
 
 _TRUE_INPUTS = ("SPEED_FDBK", "OSV_FDBK")
-"""Inputs on which a force has no effect (52.1.5): the loop gets what is under it."""
+"""Inputs on which a force has no effect (52.1.5): the loop gets the value under it."""
 _SCR_TEST = "BAD_SCR_OUT"
-"""The output whose programming enables the shorted SCR test (52.3.1)."""
+"""The output that enables the shorted SCR test if it is programmed (52.3.1)."""
 _RECORDS = "DIAG_DATA"
 _new = tuple.__new__
-"""Makes a named tuple as tuples are made: its own way takes twice the time."""
+"""Makes a named tuple like a plain tuple: its own constructor takes twice the time."""
 _FRESH = CurrentMinorLoop().numbers()
 _NOTHING = [0.0] * NUMBERS
-"""What a snapshot has of a loop that has not scanned, as every block state of an installation is 0 (decision)."""
+"""The numbers in a snapshot of a loop that has not scanned, as every block state of an installation is 0 (decision)."""
 
 
 Under = tuple[int, int, Value]
-"""An input of the loop that a force holds: its place in ``Inputs``, its view, and what is under the force."""
+"""An input of the loop that a force holds: its place in ``Inputs``, its view, and the value under the force."""
 Sensed = tuple[int, Measured, Sequence[Under]]
-"""Rack time of a scan, what was measured, and what is under forces."""
+"""Rack time of a scan, the measurement, and the values under forces."""
 
 
 class _LoopScans:
-    """The minor loop's part of the scans that one ``io`` executes; what ``io`` records has all of it."""
+    """The minor loop's part of the scans that one ``io`` executes; the record of ``io`` contains all of it."""
 
     def __init__(self, task: CmlTask, io: TaskIo, memory: ScanMemory, hear: Hear) -> None:
-        """Take part in the scans of an ``io``: from now on it tells when it latches."""
+        """Take part in the scans of an ``io``, whose latches are timed from now on."""
         self._task, self._io, self._memory, self._hear = task, io, memory, hear
         self._recording = io if isinstance(io, RecordingIo) else None
         self._latched_ns = 0
@@ -64,7 +64,7 @@ class _LoopScans:
     def scan(self, inputs: tuple[Any, ...], records: list[Value] | None) -> Sequence[Value] | None:
         """Execute a scan of the loop; ``records`` is a local DIAG_DATA.
 
-        Returns the outputs but DIAG_DATA in their order, None where none is written.
+        Returns the outputs without DIAG_DATA in their order, None if none is written.
         """
         task, recording = self._task, self._recording
         now_ns, measured, under = self._hear(self._sense)
@@ -113,7 +113,7 @@ class _LoopScans:
                 self._io.write_now(view, 0, index)
 
     def _keep(self, record: Record, records: list[Value] | None) -> None:
-        """Write a record of the diagnostic data: an array of the task's own, or a common in actual memory (52.3.2)."""
+        """Write a record of the diagnostic data: to a local array, or to a common in actual memory (52.3.2)."""
         view, io = self._task.records, self._io
         if records is not None:
             page = page_of(int(records[PAGE_NUMBER]))
@@ -126,7 +126,7 @@ class _LoopScans:
 
 
 class CmlIo(TaskIo):
-    """What a scan of a current minor loop task touches."""
+    """Access of a scan of a current minor loop task to memory and drive."""
 
     def __init__(self, task: CmlTask, memory: ScanMemory, hear: Hear = at_once) -> None:
         """Bind a task and the memory that its scans work on."""
@@ -139,7 +139,7 @@ class CmlIo(TaskIo):
 
 
 class RecordingCmlIo(RecordingIo):
-    """The same, noting everything, what was measured and commanded among the reads."""
+    """The same, with everything noted, measurement and command among the reads."""
 
     def __init__(self, task: CmlTask, memory: ScanMemory, hear: Hear = at_once) -> None:
         """Bind a task and the memory that its scans work on."""
@@ -154,8 +154,8 @@ class RecordingCmlIo(RecordingIo):
 class CmlTask(Task):
     """A task that runs the current minor loop of a drive.
 
-    ``cml`` is its CALL; ``records`` the view of a common DIAG_DATA, None without one; ``true_inputs`` are place in
-    ``Inputs`` and view of the commons that a force does not change for the loop.
+    ``cml`` is its CALL; ``records`` is the view of a common DIAG_DATA, None without one; ``true_inputs`` are place in
+    ``Inputs`` and view of the commons for which the loop ignores forces.
     """
 
     cml: BoundCall
@@ -180,7 +180,7 @@ class CmlTask(Task):
         )
 
     def install(self, compiled: CompiledTask) -> None:
-        """Begin again, with this or another program of such a task."""
+        """Install this or another program of such a task, as at the beginning."""
         cml = compiled.program.cml
         assert cml is not None
         self.cml = cml
@@ -201,7 +201,7 @@ class CmlTask(Task):
         return self._port
 
     def sense(self, latched_ns: int) -> Sensed:
-        """Return rack time, what the 57C406 has measured, and what is under forces that have no effect on the loop."""
+        """Return rack time, the measurement, and the values under forces that have no effect on the loop."""
         measured = self.port.measure(self._slots[1])
         under: tuple[Under, ...] = ()
         if self._inputs_forced:
@@ -219,34 +219,34 @@ class CmlTask(Task):
         return record
 
     def scan(self, now_ns: int, skipped: int = 0) -> ScanRecord | None:
-        """Execute one scan at an interrupt; with the task's end the drive's comes too."""
+        """Execute one scan at an interrupt; if the task ends, the drive stops."""
         record = super().scan(now_ns, skipped)
         self._follow_end()
         return record
 
     def begin_steps(self, now_ns: int, skipped: int, form: ScanSteps | None) -> Begun:
-        """Begin a scan in steps: one that is given up leaves the loop as it is now."""
+        """Begin a scan in steps: if it is abandoned, the loop is as it is now."""
         begun = super().begin_steps(now_ns, skipped, form)
         self._before = self.loop.numbers()
         return begun
 
     def end_steps(self, outcome: Any) -> None:
-        """End the scan under way."""
+        """End the scan in progress."""
         super().end_steps(outcome)
         self._before = None
         self._follow_end()
 
     def give_up_steps(self) -> None:
-        """Leave task and loop as the scan under way found them."""
+        """Restore task and loop to their state before the scan in progress."""
         super().give_up_steps()
         before, self._before = self._before, None
         if before is not None:
             self.loop.take(before)
 
     def why_not_forced(self, name: str, scope: Scope) -> str | None:
-        """Return why a variable cannot be forced: an output of the loop, or a local that its faults look at (52.0).
+        """Return why a variable cannot be forced: an output of the loop, or a local that its faults depend on (52.0).
 
-        A common SPEED_FDBK or OSV_FDBK may be forced for all others: the loop looks at what is under it (decision).
+        A common SPEED_FDBK or OSV_FDBK may be forced for all others: the loop uses the value under it (decision).
         """
         symbol = self.compiled.program.symbols.get(name)
         if symbol is None or symbol.scope is not scope:
@@ -266,7 +266,7 @@ class CmlTask(Task):
         return [*values[:-LOG_NUMBERS], *(_NOTHING if numbers == _FRESH else numbers), *values[-LOG_NUMBERS:]]
 
     def restore(self, values: list[Value]) -> None:
-        """Take a snapshot over.
+        """Restore a snapshot.
 
         Raises:
             ValueError, OverflowError: it does not fit the layout.
@@ -289,12 +289,12 @@ class CmlTask(Task):
         return any(self.memory.is_forced(view) for _, view in self.true_inputs)
 
     def _follow_end(self) -> None:
-        """Without its task a drive stops at once."""
+        """Stop the drive at once if the task does not run any more."""
         if self.status is not Status.RUNNING:
             self.port.disarm()
 
     def _common(self, keyword: str, compiled: CompiledTask) -> int | None:
-        """Return the view of the common that a parameter names, None where it names none."""
+        """Return the view of the common that a parameter names; None if it names none."""
         given = self.cml.arguments.get(keyword)
         if not isinstance(given, Reference):
             return None

@@ -1,6 +1,6 @@
 """Hardware interrupts: which events of which tasks a module's interrupt status and control register (ISCR) sets.
 
-An EVENT with INTERRUPT_STATUS names a common that stands on an ISCR; when the module interrupts, the event is set
+An EVENT with INTERRUPT_STATUS names a common that shows an ISCR; when the module interrupts, the event is set
 (J-3675 p. 6-17). The operating system enables the interrupt by the EVENT of an installed task (57C411 p. 4-1).
 """
 
@@ -21,13 +21,13 @@ class Interrupts:
     """The interrupts of one rack."""
 
     def __init__(self, memory: CommonMemory, events: Events) -> None:
-        """Begin with tasks that declare no hardware event."""
+        """Create it without hardware events."""
         self._memory, self._events = memory, events
         self._bound: dict[_Iscr, dict[tuple[int, str, str], tuple[Task, Event]]] = {}
         self._watchers: list[Callable[[], None]] = []
 
     def bind(self, task: Task) -> None:
-        """Connect the hardware events that a task declares, in place of those of its former source."""
+        """Connect the hardware events that a task declares, in place of those of its earlier source."""
         for bound in self._bound.values():
             for key in [key for key, (other, _) in bound.items() if other is task]:
                 del bound[key]
@@ -49,14 +49,14 @@ class Interrupts:
         return bool(self._bound.get((bank, register)))
 
     def waiting(self, bank: int, register: int) -> list[str]:
-        """Return the tasks in RUN that an interrupt lets go on, in the order of priority and name."""
+        """Return the tasks in RUN that an interrupt resumes, in the order of priority and name."""
         bound = sorted(self._bound.get((bank, register), {}).items())
         return [task.name for (*_, event), (task, _) in bound if task.status is Status.RUNNING and awaits(task, event)]
 
     def post(self, bank: int, register: int, now_ns: int, skipped: int = 0) -> None:
         """Set the events of an ISCR, each once, in the order of priority and name of their tasks.
 
-        ``skipped`` interrupts before this one were left out, since the host was late.
+        ``skipped`` interrupts before this one were left out because the host was late.
         """
         bound = sorted(self._bound.get((bank, register), {}).items())
         for event in dict.fromkeys(event for _, (_, event) in bound):

@@ -1,4 +1,4 @@
-"""What a reloaded task takes over from the program that it ran before: values by name, as far as they fit."""
+"""The values that a reloaded task keeps from the program that it ran before: by name, if they fit."""
 
 from __future__ import annotations
 
@@ -23,11 +23,10 @@ class Keeper(Protocol):
 
 
 def carry_over(before: Layout, values: Sequence[Value], task: Keeper) -> tuple[str, ...]:
-    """Give a task that was just installed the variables that it had before; return the names that it has kept.
+    """Restore variables of a task that was just installed again; return the names of those that it has kept.
 
-    A local is kept if name, type and dimensions are the same (a string: if it fits), a tunable if it lies within the
-    limits that it has now. Blocks begin again, as always when a task is put into RUN, and the error log is empty
-    (decision).
+    A local is kept if name, type and dimensions are the same (a string: if it fits), a tunable if it is also within its
+    new limits. Blocks start again, as always when a task is put into RUN, and the error log is empty (decision).
     """
     old = _parts(before, values)
     layout, fresh = task.layout, task.snapshot()

@@ -1,4 +1,4 @@
-"""A task of the kind that its program is of."""
+"""Creates the kind of task that a program needs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def make_task(
     channels: ChannelAccess | None = None,
     drives: DriveAccess | None = None,
 ) -> Task:
-    """Install a task: a BASIC one with its channels, one of a drive with the rack's drives, or one that scans."""
+    """Install a task: a BASIC one with channels, one of a drive with the rack's drives, or a plain one that scans."""
     program = compiled.program
     if program.is_basic:
         return BasicTask(

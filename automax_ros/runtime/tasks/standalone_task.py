@@ -1,4 +1,4 @@
-"""A task without a rack: its own declarations define the common memory it works on."""
+"""A task without a rack: its declarations define its common memory."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from automax_ros.runtime.memory.views import ViewSpec, fitting
 from automax_ros.runtime.tasks.task import Task
 
 _TASK, _OUTSIDE = 1, 2
-"""Writers of the memory: the task, and whoever sets variables between scans."""
+"""Writers of the memory: the task, and the program that sets variables between scans."""
 
 
 @dataclass(frozen=True)
 class LoneVariable:
-    """One value of a lone task: a simple variable or an array's element, with how to read and how to set it.
+    """One value of a lone task: a simple variable or an array's element, with functions that read and write it.
 
-    ``write`` takes a value of the variable's own type and raises ValueError if the variable cannot hold it.
+    ``write`` accepts a value of the variable's type and raises ValueError if the variable cannot hold it.
     """
 
     label: str
@@ -34,10 +34,10 @@ class LoneVariable:
 
 
 class StandaloneTask:
-    """A task in a rack of its own, where everybody may read and set all its variables between scans."""
+    """A task without a rack, whose variables may all be read and set between scans."""
 
     def __init__(self, program: Program, native: NativeForms = IN_PYTHON) -> None:
-        """Compile and install the task; its memory is all 0. ``native`` says whether it scans as machine code."""
+        """Compile and install the task; its memory is all 0. ``native`` decides whether it scans as machine code."""
         self.program = program
         self._views = {spec.name: view for view, spec in enumerate(views_of(program))}
         self.memory = CommonMemory(views_of(program))

@@ -38,14 +38,14 @@ EVENT_TIMEOUT = 7071
 PRINTED_LINES = 1000
 """Lines of PRINT that a task keeps."""
 _RUNNING: Final = Status.RUNNING
-"""A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
+"""Kept as a constant, because each scan needs it and an enumeration's member is slow to get."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Task:
     """One task in one rack: its compiled functions, its state, and its place in the rack.
 
-    ``writer`` is the id under which the write log knows it. Nothing happens before ``run``.
+    ``writer`` is its id in the write log. Nothing is executed before ``run``.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Task:
         memory.watch_forces(self._look_at_forces)
 
     def install(self, compiled: CompiledTask) -> None:
-        """Begin again, with this or another program: state and error log are as at installation (2.4.5)."""
+        """Install this or another program: state and error log are as at installation (2.4.5)."""
         self._put_down()
         self.compiled = compiled.holding(frozenset())
         self.forces: dict[str, Value] = {}
@@ -96,7 +96,7 @@ class Task:
 
     @property
     def period_ns(self) -> int:
-        """Scan period."""
+        """The scan period, ns."""
         return self.compiled.program.period_ns
 
     @property
@@ -106,16 +106,16 @@ class Task:
 
     @property
     def state(self) -> StateValues:
-        """The state, field by field as ``compiled.layout`` has it.
+        """The state, field by field as in ``compiled.layout``.
 
-        Between scans the compiled scan holds it, so ask again after each scan: a list got earlier is out of date. While
-        a modeled scan is under way it is that of the scan before.
+        Between scans the compiled scan holds it, so get it again after each scan: an earlier list is out of date. While
+        a modeled scan is in progress it is the state after the scan before.
         """
         self._put_down()
         return self._state
 
     def record_scans(self, *, on: bool = True) -> None:
-        """Begin or end to keep a record of each scan."""
+        """Begin or stop keeping a record of each scan."""
         self._put_down()
         self._recording = on
         self._bind()
@@ -145,7 +145,7 @@ class Task:
         record, noting = None, self._noting
         if noting is not None:
             noting.record = record = ScanRecord(now_ns, self.scan_number, skipped)
-        if self._image is not None:  # the same, known by its class: an attribute of machine code
+        if self._image is not None:  # the same object with its class known: a compiled attribute
             self._image.now_ns = now_ns
         else:
             self.memory.now_ns = now_ns
@@ -159,7 +159,7 @@ class Task:
                     self.status = Status.ENDED
                 break
         except BaseException as error:
-            # The scans have stored the state and ended: the next one begins from it.
+            # The scans have stored the state and ended: the next one starts from it.
             self._scans = None
             if not isinstance(error, ScanTooLong):
                 raise
@@ -168,30 +168,31 @@ class Task:
 
     @property
     def is_done(self) -> bool:
-        """Whether it has come to the end of its program, as only a BASIC task can: not by STOP."""
+        """Whether it has reached the end of its program, as only a BASIC task can: not by STOP."""
         return False
 
     @property
     def present_scan(self) -> int:
-        """The number of the scan under way, or of the last one."""
+        """The number of the scan in progress, or of the last one."""
         return self.scan_number + (self._under_way is not None)
 
     @property
     def progress(self) -> Progress | None:
-        """How far the scan is that is under way in modeled time, None where none is."""
+        """The progress of the modeled scan that is being executed; None if there is none."""
         return None if self._under_way is None else self._under_way.progress
 
     def scan_modeled(self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None) -> Steps:
         """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
 
-        Yields the ns that pass before the next memory access and is sent the time then, None for the time it is; with
-        another ``form`` of the scan, what that yields. State and number of the scan are the task's when the generator
-        has ended; closed before that, it leaves them as they were (decision: what it has written stays written).
+        It yields the ns that pass before the next memory access and is sent the time then, None if it is unchanged;
+        with another ``form`` of the scan, what that yields. State and number of the scan become the task's when the
+        generator has ended; closed before that, it leaves them as they were (decision: what it has written stays
+        written).
         """
         return scan_in_steps(self, now_ns, skipped, form)
 
     def begin_steps(self, now_ns: int, skipped: int, form: ScanSteps | None) -> Begun:
-        """Begin a scan in steps, of a task in RUN: see ``scan_modeled``."""
+        """Begin a scan in steps; the task must be in RUN: see ``scan_modeled``."""
         self.heed_forces()
         self._put_down()
         self._heard.begin()
@@ -205,7 +206,7 @@ class Task:
         return scan, record, (form or self._form_in_steps())(scan.state, self._heard_io)
 
     def end_steps(self, outcome: Any) -> None:
-        """End the scan under way with what its compiled form returned: TRUE if the task executed STOP."""
+        """End the scan in progress with the result of its compiled form: TRUE if the task executed STOP."""
         scan = self._under_way
         assert scan is not None
         self.scan_number += 1
@@ -216,15 +217,15 @@ class Task:
             self._over(outcome, scan.began_ns)
 
     def give_up_steps(self) -> None:
-        """Leave the task as the scan under way found it.
+        """Restore the task to its state before the scan in progress.
 
-        Forces that wait go on doing so: a scan may be given up by the garbage collector, amid anything.
+        Waiting forces are not applied: the garbage collector may abandon a scan at any point of the program.
         """
         scan, self._under_way = self._under_way, None
         self.errors = ErrorLog() if scan is None or scan.log is None else scan.log
 
     def resume_scan(self, progress: Progress) -> Steps:
-        """Return a scan in steps that is as far as another was: it has announced its last step (see ``progress``)."""
+        """Return a scan in steps with the progress of another: the last step of that was yielded (see ``progress``)."""
         steps = self.scan_modeled(progress["began_ns"], progress["skipped"])
         now_ns = self.memory.now_ns
         for number in range(progress["steps"]):
@@ -241,7 +242,7 @@ class Task:
             self.status = Status.STOPPED
 
     def fault(self, code: int, now_ns: int) -> ScanRecord | None:
-        """Fault the task for a scan that cannot be: logged at SCAN_LOOP. Returns a record of that alone, if kept."""
+        """Fault the task for an impossible scan, logged at SCAN_LOOP. Returns a record of that alone, if kept."""
         self.scan_number += 1
         record = self._begin_record(now_ns, 0, self._io)
         self._io.log(self.compiled.program.scan_loop_line, code)
@@ -249,11 +250,11 @@ class Task:
         return record
 
     def log_error(self, line: int, code: int) -> None:
-        """Log a run-time error of the scan that is executed."""
+        """Log a run-time error of the scan in progress."""
         add_error(LogEntry(line, code, self.present_scan), self.errors, self._under_way)
 
     def clear_errors(self, *, inside: bool = False) -> None:
-        """Empty the error log, from ``inside`` a scan or as the operator does."""
+        """Clear the error log, from ``inside`` a scan or as the operator does."""
         self.errors = cleared_errors(self.errors, self._under_way, inside=inside)
 
     def snapshot(self) -> list[Value]:
@@ -262,7 +263,7 @@ class Task:
         return [*self.compiled.layout.flatten(self.state), *errors.flatten()]
 
     def restore(self, values: list[Value]) -> None:
-        """Take a snapshot over.
+        """Restore a snapshot.
 
         Raises:
             ValueError: it does not fit the layout.
@@ -292,7 +293,7 @@ class Task:
             self._under_way.state[position] = fitting
 
     def tuning(self, name: str, value: object) -> int | float:
-        """Return what a tunable would hold if it were set to a value; nothing is set.
+        """Return the value that a tunable would have if it were set to ``value``; nothing is set.
 
         Raises:
             KeyError: the task has no tunable of that name.
@@ -303,20 +304,20 @@ class Task:
     def hold(self, forces: Mapping[str, Value]) -> None:
         """Hold these simple locals, and no others, at values of their types against every write of the task.
 
-        A scan that is under way in modeled time ends first, and as it began (decision). ``forces`` has what was asked
-        for, ``held`` what is heeded.
+        A modeled scan in progress ends first, as it began (decision). ``forces`` has the requested values, ``held``
+        those in effect.
         """
         self.forces = dict(forces)
         self._forces_wait = True
         self.heed_forces()
 
     def why_not_forced(self, name: str, scope: Scope) -> str | None:  # noqa: ARG002
-        """Return why a variable that the task declares in a scope cannot be forced, None where it can."""
+        """Return why a variable that the task declares in a scope cannot be forced; None if it can."""
         return None
 
     @property
     def held(self) -> dict[str, Value]:
-        """The locals that the next scan finds held, with their values, by name."""
+        """The locals that are held in the next scan, with their values, by name."""
         layout, state = self.compiled.layout, self._state
         found: dict[str, Value] = {}
         for name in sorted(self.compiled.held):
@@ -326,11 +327,11 @@ class Task:
         return found
 
     def lose_locals(self) -> None:
-        """Set the locals to their values at installation; what is forced keeps its value, tunables too."""
+        """Set the locals to their values at installation, except forced ones and tunables."""
         self.compiled.layout.lose_locals(self.state, self.forces)
 
     def heed_forces(self) -> None:
-        """Scan from now on in the form that keeps the forced locals, which have their values; not amid a scan."""
+        """Set forced locals to their values, and scan in the form that keeps them; during a scan do nothing."""
         if not self._forces_wait or self._under_way is not None:
             return
         self._forces_wait = False
@@ -340,27 +341,27 @@ class Task:
             self._state[self.compiled.layout.index(name)] = value
 
     def _look_at_forces(self) -> None:
-        """Scan from now on in the form that heeds forces, or in the quick one."""
+        """Scan from now on in the form that respects forces, or in the fast one."""
         self._put_down()
         self._forced = any(map(self.memory.is_forced, self.written))
 
     def waiting(self) -> list[int]:
-        """Return, as numbers, what a suspended task waits for; a control-block task is never suspended."""
+        """Return, as numbers, the wait of a suspended task; a control-block task is never suspended."""
         return []
 
     def wait_again(self, numbers: Sequence[int]) -> None:
-        """Take over what ``waiting`` gave; ValueError where a task cannot wait for that."""
+        """Restore what ``waiting`` returned; raise ValueError if a task cannot wait for that."""
         if numbers:
             raise ValueError(f"task {self.name} cannot wait: only a BASIC task can")
 
     def _put_down(self) -> None:
-        """Let the compiled scan store the state that it holds."""
+        """Make the compiled scan store the state that it holds."""
         if self._scans is not None:
             self._scans.close()
             self._scans = None
 
     def _copy_arrays(self, state: StateValues) -> None:
-        """Give a copy of the state arrays of its own."""
+        """Give a copy of the state its own arrays."""
         for position in self._arrays:
             array = state[position]
             assert isinstance(array, list)
@@ -375,11 +376,11 @@ class Task:
         return self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
 
     def _over(self, outcome: Any, began_ns: int) -> None:  # noqa: ARG002
-        """End a scan with what its compiled form returned, if that is not FALSE: TRUE if the task executed STOP."""
+        """End a scan with the result of its compiled form, if that is not FALSE: TRUE if the task executed STOP."""
         self.status = Status.ENDED
 
     def _bind(self) -> None:
-        """Bind what scans touch: memory itself, or for modeled scans what is noted meanwhile."""
+        """Bind the access of scans: to memory itself, and for modeled scans to memory with noted reads."""
         self._io, self._heard_io = self._make_io(self.memory, at_once), self._make_io(self._heard, self._heard.hear)
         self._noting = self._io if isinstance(self._io, RecordingIo) else None
 
@@ -387,13 +388,13 @@ class Task:
         return RecordingIo(self, memory, hear) if self._recording else TaskIo(self, memory, hear)
 
     def _begin_record(self, now_ns: int, skipped: int, io: TaskIo) -> ScanRecord | None:
-        """Return the new record of a scan, or None if none is kept."""
+        """Return a new record for a scan, or None if none is kept."""
         if not isinstance(io, RecordingIo):
             return None
         io.record = ScanRecord(now_ns, self.present_scan, skipped=skipped)
         return io.record
 
     def too_long(self, error: ScanTooLong) -> None:
-        """Fault the task for the scan that is executed."""
+        """Fault the task for a scan that takes too long."""
         (self._io if self._under_way is None else self._heard_io).log(error.line, SCAN_TOO_LONG)
         self.status = Status.FAULTED

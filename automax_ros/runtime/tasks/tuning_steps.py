@@ -1,4 +1,4 @@
-"""Moves of a tunable by its STEP, as an operator's raise and lower keys make them (2.4.5)."""
+"""Changes of a tunable by its STEP, as by an operator's raise and lower keys (2.4.5)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from automax_ros.runtime.tasks.task import Task
 
 
 def stepped(task: Task, name: str, steps: int) -> int | float:
-    """Return what a tunable would be after ``steps`` of its STEP up, or down where negative, within its limits.
+    """Return the value of a tunable after ``steps`` of its STEP up, or down if negative, within its limits.
 
     Steps are added as decimals, as they are written: ten of 0.1 are 1.0.
 

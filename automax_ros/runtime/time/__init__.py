@@ -1,1 +1,1 @@
-"""The scheduler in integer nanoseconds, and what lets its time pass."""
+"""The scheduler in integer nanoseconds, and the pacers that advance its time."""

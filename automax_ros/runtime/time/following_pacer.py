@@ -1,14 +1,14 @@
-"""Time that another's clock gives, message by message: a simulator's, or a recording's.
+"""A pacer that follows the clock of another program, message by message: a simulator's, or a recording's.
 
-Rack time 0 is the first time that is heard. At each later one every event up to and at it has happened at its own
-instant: none is skipped, and no wall clock is asked, so the same sequence of times and writes gives the same scans.
-What comes from outside happens at the last time that was heard.
+Rack time 0 is the first time received. For each later one every event up to and at it is executed at its own instant:
+none is skipped, and the wall clock is not used, so the same sequence of times and writes gives the same scans. Writes
+from outside take effect at the last time received.
 
-A rack cannot go back. Where the clock does (a recording that begins again, a simulator that is reset), rack time goes
-on from where it is, and so do stamps, which are ahead of the clock from then on (decision: a recording's messages stay
-in order; who wants a fresh run starts the rack again). Where the clock goes ahead by more than ``LONGEST_JUMP_NS`` at
+A rack cannot go back. If the clock does (a recording that begins again, a simulator that is reset), rack time continues
+from where it is, and so do stamps, which are ahead of the clock from then on (decision: a recording's messages stay
+in order; who wants a fresh run starts the rack again). If the clock goes ahead by more than ``LONGEST_JUMP_NS`` at
 once, the time between is left out, and stamps are the clock's (decision: a clock that begins at 0 and then tells the
-time of day would have the rack scan for 50 years). Both are told. A time of 0 says nothing, as everywhere in ROS.
+time of day would have the rack scan for 50 years). Both are reported. A time of 0 is ignored, as everywhere in ROS.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LONGEST_JUMP_NS = 10 * NS_PER_S
 
 
 class FollowingPacer:
-    """Lets a scheduler's time follow a clock; whoever hears the clock calls ``heard`` while it has its ``turn``."""
+    """Makes a scheduler's time follow a clock; its receiver calls ``heard`` while it holds ``turn``."""
 
     def __init__(
         self,
@@ -34,11 +34,11 @@ class FollowingPacer:
         wait: Wait = WALL_WAIT,
         turn: Turn | None = None,
     ) -> None:
-        """Take a scheduler.
+        """Create it for a scheduler.
 
         Args:
-            scheduler: whose events are carried out.
-            jumped: gets by how much (ns) the clock has jumped where the rack does not follow it; negative is back.
+            scheduler: its events are executed.
+            jumped: called with the size (ns) of a jump of the clock that the rack does not follow; negative is back.
             wait: spends at most a time in s.
             turn: held while ``run`` calls ``on_idle``.
         """
@@ -51,25 +51,25 @@ class FollowingPacer:
 
     @property
     def has_clock(self) -> bool:
-        """Whether a time has been heard, so that the rack can begin."""
+        """Whether a time was received, so that the rack can start."""
         return self._heard_ns is not None
 
     @property
     def now_ns(self) -> int:
-        """The scheduler's time: that of the clock, less where it began."""
+        """The scheduler's time: that of the clock, minus its first time."""
         return self._scheduler.now_ns
 
     def begin(self, start_delay_ns: int = 0) -> int:  # noqa: ARG002
-        """Let the scheduler's present be the last time that was heard, which is returned."""
+        """Map the scheduler's present to the last time received, which is returned."""
         heard = self._heard_ns or 0
         self._zero_ns, self._opens = heard - self._scheduler.now_ns, True
         return heard
 
     def catch_up(self) -> None:
-        """Nothing: the present is the last time that was heard."""
+        """Do nothing: the present is the last time received."""
 
     def heard(self, clock_ns: int) -> None:
-        """Take a time of the clock, and carry out all that happens up to it once the rack has begun."""
+        """Follow the clock to a time, and execute all events up to it if the rack has started."""
         if clock_ns <= 0:
             return
         self._heard_ns = clock_ns
@@ -83,7 +83,7 @@ class FollowingPacer:
             self._pass(self._scheduler.now_ns + ahead)
 
     def ahead_ns(self, clock_ns: int) -> int:
-        """Return how far a time of the clock is ahead of the last one, 0 before the rack has begun."""
+        """Return how far a time of the clock is ahead of the last one, ns; 0 before the rack has started."""
         return 0 if self._zero_ns is None else clock_ns - self._zero_ns - self._scheduler.now_ns
 
     def _pass(self, target_ns: int) -> None:
@@ -93,7 +93,7 @@ class FollowingPacer:
             self._scheduler.run_through(target_ns)
 
     def step(self) -> float:
-        """Carry out what happens at the instant of ``begin``; later nothing is due but when the clock is heard."""
+        """Execute the events at the instant of ``begin``; later ones are executed by ``heard``."""
         if self._opens:
             self._opens = False
             self._pass(self._scheduler.now_ns)
@@ -105,7 +105,7 @@ class FollowingPacer:
         on_idle: Callable[[int], None] | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Wait while ``heard`` lets time pass, until it is ``until_ns``, or asked to stop (``Pace.run``)."""
+        """Wait while ``heard`` advances time, until it is ``until_ns``, or until asked to stop (``Pace.run``)."""
         self._until_ns = until_ns
         by_steps(
             self,

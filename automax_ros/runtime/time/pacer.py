@@ -1,17 +1,19 @@
-"""The pacer: lets a scheduler's time follow the wall clock; the one place below ROS that asks a clock.
+"""The pacer: makes a scheduler's time follow the wall clock; the one place below ROS that reads a clock.
 
-rack.start()
-Pacer(rack.scheduler).run(10 * NS_PER_S)      # ten seconds of the wall clock
+::
 
-Every event stands on an absolute deadline. A periodic one that the host made the loop miss is skipped and counted, and
-the next stays on the grid (``Scheduler.run_due``); a drive's interrupts are all carried out, late ones in order. How
-the time to the next deadline is spent is the caller's. What other threads bring from outside falls between two events:
-they hold what ``turn`` holds.
+    rack.start()
+    Pacer(rack.scheduler).run(10 * NS_PER_S)      # ten seconds of the wall clock
 
-``halt`` lets time stand still until ``resume``; nothing is late or skipped by that. Whoever steps a halted rack lets
-the scheduler's time go on by itself.
+Every event has an absolute deadline. A periodic one that the loop misses because of the host is skipped and counted,
+and the next stays on the grid (``Scheduler.run_due``); a drive's interrupts are all executed, late ones in order. The
+caller decides how the time to the next deadline is spent. Actions of other threads fall between two events: they hold
+the same lock as ``turn``.
 
-What lets a scheduler's time pass: on the wall clock, simulated, or after another's clock.
+``halt`` stops time until ``resume``; no event is late or skipped because of it. A program that steps a halted rack
+advances the scheduler's time itself.
+
+``Pace`` is the protocol of all pacers: on the wall clock, simulated, or after the clock of another program.
 """
 
 from __future__ import annotations
@@ -27,28 +29,28 @@ from automax_ros.runtime.time.scheduler import Scheduler
 Wait = Callable[[float], object]
 """Spends at most a time in s, 0 or more; it may return early."""
 Turn = AbstractContextManager[object]
-"""What keeps other threads from the rack while it is held."""
+"""A lock that keeps other threads from the rack while it is held."""
 
 
 BREATH_S, BREATH_PERIOD_NS = 0.0001, 2 * NS_PER_MS
-"""A pace that never waits lets other threads have their turn: how long, and how often (ns of the wall clock)."""
+"""How long (s), and how often (ns of the wall clock), a pacer that never waits gives other threads time."""
 
 
 class Pace(Protocol):
-    """Keeps the time of one scheduler."""
+    """Advances the time of one scheduler."""
 
     @property
     def now_ns(self) -> int:
         """The time that the scheduler should have, ns; negative before it begins."""
 
     def begin(self, start_delay_ns: int = 0) -> int:
-        """Let the scheduler's present be now, or ``start_delay_ns`` from now; return the stamp (ns) that it has."""
+        """Map the scheduler's present to now, or to ``start_delay_ns`` from now; return its stamp (ns)."""
 
     def catch_up(self) -> None:
-        """Bring the scheduler's time to the present, before something comes from outside."""
+        """Advance the scheduler's time to the present, before an action from outside."""
 
     def step(self) -> float:
-        """Carry out what is due, and return how long (s) the caller may spend before the next call."""
+        """Execute due events, and return how long (s) the caller may spend before the next call."""
 
     def run(
         self,
@@ -56,7 +58,7 @@ class Pace(Protocol):
         on_idle: Callable[[int], None] | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Keep pace until the scheduler's time is ``until_ns`` (what is due then is left), or asked to stop.
+        """Keep pace until the scheduler's time is ``until_ns`` (events due then are left), or until asked to stop.
 
         ``on_idle`` gets the time, about every 100 ms of the wall clock.
         """
@@ -70,7 +72,7 @@ def by_steps(
     turn: Turn,
     chore: tuple[Callable[[int], None] | None, int],
 ) -> None:
-    """Step a pace until something is over; ``chore`` is what gets the time, and its period (ns of the wall clock)."""
+    """Step a pacer until ``is_over``; ``chore`` is a function that gets the time, and its period (ns, wall clock)."""
     act, period_ns = chore
     next_chore = next_breath = wall()
     while not is_over():
@@ -87,16 +89,16 @@ def by_steps(
 
 
 LONGEST_WAIT_NS = 50 * NS_PER_MS
-"""The loop wakes at least this often, so that a signal is answered at once."""
+"""The loop wakes at least this often, so that it responds to signals at once."""
 START_LEAD_NS = 50 * NS_PER_MS
-"""The start lies this far ahead of ``begin``, so that presets and start-up parts make no scan miss its deadline."""
+"""The start is this far ahead of ``begin``, so that no scan misses its deadline because of presets and start-up."""
 CHORE_PERIOD_NS = 100 * NS_PER_MS
 """How often the loop calls ``on_idle``."""
 CHORE_ROOM_NS = 2 * NS_PER_MS
-"""``on_idle`` is put off, by another period at most, while the next event is nearer than this."""
+"""``on_idle`` is delayed, by another period at most, while the next event is nearer than this."""
 WALL_CLOCK: Callable[[], int] = time.monotonic_ns
 WALL_WAIT: Callable[[float], object] = time.sleep
-"""The wall clock, for those who keep time otherwise and look after a person meanwhile."""
+"""The wall clock, for pacers that keep another time but must respond to the user meanwhile."""
 
 
 class Pacer:
@@ -110,14 +112,14 @@ class Pacer:
         wait: Callable[[float], object] = time.sleep,
         turn: AbstractContextManager[object] | None = None,
     ) -> None:
-        """Take a scheduler; its time passes from ``begin`` on.
+        """Create it for a scheduler, whose time passes from ``begin`` on.
 
         Args:
-            scheduler: whose events are carried out.
+            scheduler: its events are executed.
             clock: the wall clock in ns, monotonic.
-            wait: spends at most a time in s, 0 or more; it may return early, as when a message has come.
-            turn: held, again and again, while ``run`` carries out events or calls ``on_idle``: what keeps other threads
-                from the rack then.
+            wait: spends at most a time in s, 0 or more; it may return early, as when a message has arrived.
+            turn: held, again and again, while ``run`` executes events or calls ``on_idle``, to keep other threads from
+                the rack.
         """
         self._scheduler, self._clock, self._wait = scheduler, clock, wait
         self._turn: AbstractContextManager[object] = nullcontext() if turn is None else turn
@@ -126,19 +128,19 @@ class Pacer:
         self.while_halted: Callable[[], object] = _nothing
 
     def begin(self, start_delay_ns: int = 0) -> int:
-        """Let the scheduler's present be ``start_delay_ns`` from now on the wall clock; return that time of day, ns."""
+        """Map the scheduler's present to ``start_delay_ns`` from now on the wall clock; return that time of day, ns."""
         self._zero_ns = self._clock() + start_delay_ns - self._scheduler.now_ns
         if not self.halted:
             self._scheduler.zero_ns = self._zero_ns
         return time.time_ns() + start_delay_ns
 
     def halt(self) -> None:
-        """Let time stand still from now on; ``while_halted`` is called every now and then, 20 times per second."""
+        """Stop time; ``while_halted`` is called about 20 times per second."""
         self.catch_up()
         self.halted, self._scheduler.zero_ns = True, None
 
     def resume(self) -> None:
-        """Let time go on from where it stands."""
+        """Continue time from where it stopped."""
         self.halted = False
         self.begin()
 
@@ -153,7 +155,7 @@ class Pacer:
         return self._clock() - self._zero_ns
 
     def catch_up(self) -> None:
-        """Bring the scheduler's time to the present, before something comes from outside; nothing is carried out.
+        """Advance the scheduler's time to the present, before an action from outside; no event is executed.
 
         Before ``begin`` no time passes.
         """
@@ -161,7 +163,7 @@ class Pacer:
             self._scheduler.pass_until(self.now_ns)
 
     def step(self) -> float:
-        """Carry out what is due, and return how long (s) the caller may spend before the next call."""
+        """Execute due events, and return how long (s) the caller may spend before the next call."""
         self._carry_out(self.now_ns)
         return self._idle_s(None)
 
@@ -171,9 +173,9 @@ class Pacer:
         on_idle: Callable[[int], None] | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Keep pace until the scheduler's time is ``until_ns`` (what is due then is left), or asked to stop.
+        """Keep pace until the scheduler's time is ``until_ns`` (events due then are left), or until asked to stop.
 
-        ``on_idle`` gets the time, about every 100 ms, where there is time before the next event.
+        ``on_idle`` gets the time, about every 100 ms, if there is time before the next event.
         """
         next_chore = self._clock() + max(0, -self.now_ns)
         while not should_stop():
@@ -183,7 +185,7 @@ class Pacer:
                     self._scheduler.run_due(until_ns - 1)
                     self._scheduler.pass_until(until_ns)
                 return
-            with self._turn:  # the queue, too, is looked at within it: a look takes out what was cancelled
+            with self._turn:  # also for the queue: reading it removes cancelled events
                 self._carry_out(now)
                 is_chore_time = self._is_chore_time(next_chore)
                 idle_s = self._idle_s(until_ns)
@@ -201,7 +203,7 @@ class Pacer:
             self._scheduler.run_due(now_ns)
 
     def _is_chore_time(self, since_ns: int) -> bool:
-        """Return whether a chore, due since a time of the wall clock, may be done: there is room, or it waits long."""
+        """Return whether a chore, due since a time of the wall clock, may be done: it has time, or has waited long."""
         waited = self._clock() - since_ns
         if waited < 0 or self.halted or waited >= CHORE_PERIOD_NS:
             return waited >= 0
@@ -217,4 +219,4 @@ class Pacer:
 
 
 def _nothing() -> None:
-    """Do nothing while time stands still."""
+    """Do nothing while time is stopped."""

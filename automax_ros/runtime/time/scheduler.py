@@ -1,8 +1,8 @@
-"""The scheduler: an event queue in integer nanoseconds; time belongs to it and to nobody else.
+"""The scheduler: an event queue in integer nanoseconds; only the scheduler has the time.
 
-Events are ordered by (time, class, priority, name), so nothing is left to chance. ``run_until`` is simulated time:
-every event at its own instant. ``run_due`` is the wall clock: somebody who knows the time calls it, periodic events
-whose instants have passed unserved are skipped and counted, and the next one stays on the grid.
+Events are ordered by (time, class, priority, name), so their order is deterministic. ``run_until`` is simulated time:
+every event at its own instant. ``run_due`` is for the wall clock: the pacer calls it with the time, periodic events
+whose instants have passed are skipped and counted, and the next one stays on the grid.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 Action = Callable[[int], None]
-"""What an event does, given its instant in ns."""
+"""The action of an event, given its instant in ns."""
 PeriodicAction = Callable[[int, int], None]
-"""What a periodic event does, given its instant in ns and the number of instants skipped just before it."""
+"""The action of a periodic event, given its instant in ns and the number of instants skipped just before it."""
 
 
 class EventClass(enum.IntEnum):
-    """What comes first at one instant: writes from outside, start of tasks, I/O, execution, scans, observers.
+    """The order at one instant: writes from outside, start of tasks, I/O, execution, scans, observers.
 
-    EXECUTE is what a Processor goes on with in modeled time; a scan that ends when the next is due has ended.
+    EXECUTE is a job that a Processor continues in modeled time: a scan that ends when the next is due has ended.
     """
 
     OUTSIDE = 0
@@ -34,7 +34,7 @@ class EventClass(enum.IntEnum):
 
 @dataclass(frozen=True, order=True)
 class EventKey:
-    """The place of an event among those of its instant; ``priority`` 4 is the highest."""
+    """The order of an event among those of its instant; ``priority`` 4 is the highest."""
 
     event_class: EventClass
     priority: int
@@ -43,7 +43,7 @@ class EventKey:
 
 @dataclass(eq=False)
 class ScheduledEvent:
-    """An event that was posted; ``cancel`` takes it out of the queue."""
+    """An event that was posted; ``cancel`` removes it from the queue."""
 
     key: EventKey
     action: PeriodicAction
@@ -51,7 +51,7 @@ class ScheduledEvent:
     cancelled: bool = False
 
     def cancel(self) -> None:
-        """Let the event not happen again; a second time this does nothing."""
+        """Cancel the event; a second call does nothing."""
         self.cancelled = True
 
 
@@ -62,12 +62,12 @@ _Queued = tuple[int, int, int, str, int, ScheduledEvent]
 class Scheduler:
     """The event queue of one rack.
 
-    ``wall_ns`` is the time that ``run_due`` catches up with: ahead of ``now_ns`` while what is late is carried out.
-    ``zero_ns`` is what the clock of the pacer showed at time 0, None where none keeps pace.
+    ``wall_ns`` is the time that ``run_due`` catches up with: ahead of ``now_ns`` while late events are executed.
+    ``zero_ns`` is the time of the pacer's clock at time 0, None without a pacer.
     """
 
     def __init__(self, start_ns: int = 0) -> None:
-        """Begin at an instant with an empty queue."""
+        """Create it at an instant, with an empty queue."""
         self.now_ns = start_ns
         self._queue: list[_Queued] = []
         self._serial = 0
@@ -76,7 +76,7 @@ class Scheduler:
         self.zero_ns: int | None = None
 
     def at(self, time_ns: int, key: EventKey, action: Action) -> ScheduledEvent:
-        """Post an event that happens once.
+        """Post an event that is executed once.
 
         Raises:
             ValueError: the instant lies in the past.
@@ -118,14 +118,14 @@ class Scheduler:
         return self._queue[0][0] if self._queue else None
 
     def due_ns(self, event: ScheduledEvent) -> int | None:
-        """Return when an event happens next, None if it does not any more."""
+        """Return the next instant of an event, None if it has none any more."""
         found = (entry[0] for entry in self._queue if entry[5] is event)
         return None if event.cancelled else next(found, None)
 
     def advance_to(self, time_ns: int, key: EventKey) -> bool:
-        """Let it be ``time_ns`` if no event comes before one of that instant and key, and time goes so far.
+        """Advance to ``time_ns`` if no event precedes one of that instant and key, and the present run reaches it.
 
-        For an action that goes on at a later instant: quicker than an event of its own.
+        For an action that continues at a later instant: faster than another event.
         """
         if time_ns >= self._end_ns:
             return False
@@ -141,7 +141,7 @@ class Scheduler:
         return True
 
     def run_until(self, end_ns: int) -> None:
-        """Let simulated time pass: every event before ``end_ns`` happens at its instant, then it is ``end_ns``."""
+        """Advance simulated time to ``end_ns``: every event before it is executed at its instant."""
         queue = self._queue
         self._end_ns = end_ns
         while queue and queue[0][0] < end_ns:
@@ -158,13 +158,13 @@ class Scheduler:
         self.now_ns = max(self.now_ns, end_ns)
 
     def run_through(self, time_ns: int) -> None:
-        """Let simulated time pass as ``run_until``, with what happens at ``time_ns`` itself; then it is ``time_ns``."""
+        """Advance simulated time to ``time_ns``: every event up to and at it is executed at its instant."""
         if time_ns >= self.now_ns:
             self.run_until(time_ns + 1)
             self.now_ns = time_ns
 
     def step(self, end_ns: int) -> bool:
-        """Carry out the next event before ``end_ns``, alone; where there is none it is ``end_ns``, and FALSE."""
+        """Execute only the next event before ``end_ns``; if there is none, advance to ``end_ns`` and return False."""
         due = self.next_ns
         if due is None or due >= end_ns:
             self.now_ns = max(self.now_ns, end_ns)
@@ -177,9 +177,9 @@ class Scheduler:
         return True
 
     def run_due(self, now_ns: int) -> None:
-        """Carry out, in order, what is due at a time of the wall clock, and what becomes due up to then meanwhile.
+        """Execute, in order, the events due at a time of the wall clock, and those posted meanwhile up to that time.
 
-        A periodic event that is late by whole periods happens once, at the last of its instants that have passed;
+        A periodic event that is late by whole periods is executed once, at the last of its instants that have passed;
         the others are skipped and counted.
         """
         queue = self._queue
@@ -197,7 +197,7 @@ class Scheduler:
         self.now_ns = max(self.now_ns, now_ns)
 
     def _skip_until(self, now_ns: int) -> dict[ScheduledEvent, int]:
-        """Put periodic events that are late by whole periods at their last instant; return how many each skips."""
+        """Move periodic events that are late by whole periods to their last instant; return how many each skips."""
         skipped: dict[ScheduledEvent, int] = {}
         waiting: list[_Queued] = []
         while self._queue and self._queue[0][0] <= now_ns:
@@ -212,9 +212,9 @@ class Scheduler:
         return skipped
 
     def pass_until(self, now_ns: int) -> None:
-        """Let time of the wall clock pass, at most to the next event, which is not carried out yet.
+        """Advance to a time of the wall clock, at most to the next event, which is not executed yet.
 
-        Called before something comes from outside, so that it happens at the present and still before what is due.
+        Called before an action from outside, so that it occurs at the present and still before due events.
         """
         due = self.next_ns
         self.now_ns = max(self.now_ns, now_ns if due is None else min(now_ns, due))

@@ -1,6 +1,6 @@
-"""Simulated time that others follow: every event at its own instant, none skipped, and a clock that says how far it is.
+"""Simulated time that others can follow: every event at its own instant, none skipped, and a clock that is published.
 
-As fast as the machine can, or at ``rate`` times the wall clock. What comes from outside falls between two instants.
+It runs as fast as the machine can, or at ``rate`` times the wall clock. Actions from outside fall between two instants.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from automax_ros.runtime.time.pacer import CHORE_PERIOD_NS, LONGEST_WAIT_NS, WAL
 from automax_ros.runtime.time.scheduler import Scheduler
 
 LEAST_TICK_NS = 1 * NS_PER_MS
-"""The clock is told at most once in so much rack time (decision: what Gazebo's users have)."""
+"""The clock is published at most once in this rack time (decision: what Gazebo's users have)."""
 MOST_TICK_NS = 10 * NS_PER_MS
-"""The clock is told at least once in so much rack time (decision: ``automax play`` and rosbag2 do as often or less)."""
+"""The clock is published at least once in this time (decision: ``automax play`` and rosbag2 do as often or less)."""
 MOST_LATE_NS = 100 * NS_PER_MS
-"""What a slow host loses beyond this on the wall clock is not made up for by running faster (decision)."""
+"""Delays of a slow host beyond this on the wall clock are not made up for by running faster (decision)."""
 
 
 @dataclass(frozen=True)
 class SimulatedTime:
-    """Simulated time at ``rate`` times the wall clock, None as fast as it goes."""
+    """Simulated time at ``rate`` times the wall clock, as fast as possible if None."""
 
     rate: float | None = None
 
 
 class SimulatedPacer:
-    """Lets a scheduler's time pass by itself, and tells it."""
+    """Advances a scheduler's time without a clock, and publishes it."""
 
     def __init__(
         self,
@@ -41,12 +41,12 @@ class SimulatedPacer:
         wait: Wait = WALL_WAIT,
         turn: Turn | None = None,
     ) -> None:
-        """Take a scheduler.
+        """Create it for a scheduler.
 
         Args:
-            scheduler: whose events are carried out.
-            tell: gets the time once all is done that happens up to and at it.
-            rate: how many times faster than the wall clock, above 0; None is as fast as it goes.
+            scheduler: its events are executed.
+            tell: called with the time once all events up to and at it are executed.
+            rate: how many times faster than the wall clock, above 0; None is as fast as possible.
             clock: the wall clock in ns, monotonic; only for ``rate`` and ``on_idle``.
             wait: spends at most a time in s.
             turn: held while the scheduler's time passes.
@@ -62,27 +62,27 @@ class SimulatedPacer:
 
     @property
     def now_ns(self) -> int:
-        """The scheduler's time: nothing else keeps it."""
+        """The scheduler's time: there is no other."""
         return self._scheduler.now_ns
 
     def begin(self, start_delay_ns: int = 0) -> int:  # noqa: ARG002
-        """Let time pass from now on; stamps are rack time, so that of the present is 0 at the start."""
+        """Advance time from now on; stamps are rack time, so that of the present is 0 at the start."""
         self._zero_ns = None
         return self._scheduler.now_ns
 
     def catch_up(self) -> None:
-        """Nothing: the present is the last instant that was carried out."""
+        """Do nothing: the present is the last instant that was executed."""
 
     def halt(self) -> None:
-        """Let time stand still; ``while_halted`` is called every now and then, and the clock says what is stepped."""
+        """Stop time; ``while_halted`` is called at intervals, and the clock shows the time of steps."""
         self.halted = True
 
     def resume(self) -> None:
-        """Let time go on from where it stands."""
+        """Continue time from where it stopped."""
         self.halted, self._zero_ns = False, None
 
     def step(self) -> float:
-        """Carry out the next instant if it is due; return how long (s) it is to the next."""
+        """Execute the next instant if it is due; return the time (s) to the next."""
         if self.halted:
             self.while_halted()
             self._tell_at(self._scheduler.now_ns)
@@ -104,7 +104,7 @@ class SimulatedPacer:
         on_idle: Callable[[int], None] | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Let time pass until it is ``until_ns``, or asked to stop (``Pace.run``)."""
+        """Advance time until it is ``until_ns``, or until asked to stop (``Pace.run``)."""
         self._until_ns = until_ns
         by_steps(
             self,
@@ -124,13 +124,13 @@ class SimulatedPacer:
         return self._until_ns is not None and self._scheduler.now_ns >= self._until_ns
 
     def _target_ns(self) -> int:
-        """Return the next instant at which something happens, or the clock must be told."""
+        """Return the next instant at which an event is due, or the clock must be published."""
         tick = self._scheduler.now_ns if self._told_ns is None else self._told_ns + MOST_TICK_NS
         due = self._scheduler.next_ns
         return max(self._scheduler.now_ns, tick if due is None else min(tick, due))
 
     def _pause_ns(self) -> int:
-        """Return how long it is on the wall clock to the next instant, negative if it is late."""
+        """Return the time on the wall clock to the next instant, ns; negative if it is late."""
         if self._rate is None:
             return 0
         wall, target = self._clock(), round(self._target_ns() / self._rate)
