@@ -65,7 +65,7 @@ OR = Block(
 
 
 def latch_step(reset: bool, set: bool, clock: bool, input: bool) -> tuple[bool, bool]:
-    """Reset before set before clock; otherwise the output variable keeps what it has, whoever wrote it (15)."""
+    """Reset before set before clock; otherwise the output variable keeps its value, whatever wrote it (15)."""
     output = not reset and (set or input)
     writes = reset or set or clock
     return output, writes
