@@ -1,7 +1,7 @@
-"""Writes automax_ros/wire/message_types.json: the definition and hash of every message type that a recording holds.
+"""Writes message_types.json (automax_ros/messages/types/): definition and hash of each message type of recordings.
 
-python tools/generate_message_types.py, after a change in msg_defs/. The definitions of the standard types come from the
-ROS 2 installed with this interpreter (or AMENT_PREFIX_PATH), the type hashes (RIHS01) from rosbags.
+Run python tools/generate_message_types.py after a change in msg_defs/. The definitions of the standard types come from
+the ROS 2 installed with this interpreter (or AMENT_PREFIX_PATH), the type hashes (RIHS01) from rosbags.
 """
 
 import json
@@ -14,9 +14,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / "automax_ros" / "wire" / "message_types.json"
 OWN = "automax_msgs"
-# Parts of services' answers; no recording holds them.
+# Parts of service responses; recordings do not contain them.
 SERVED = frozenset({"LoggedError"})
-# Tables of a rack that is live, and their lines; no recording holds them: what they show is in it in other ways.
+# Tables of a live rack, and their lines; recordings do not contain them, but have their data in other forms.
 LIVE = frozenset({"Force", "ForceTable", "ScanStatistics", "TaskStatistics"})
 STANDARD = (
     "builtin_interfaces/msg/Time",
@@ -40,19 +40,19 @@ STANDARD = (
 
 
 def ros_prefixes() -> list[Path]:
-    """Where ROS 2 packages may be installed, best first."""
+    """Return the prefixes in which ROS 2 packages may be installed, best first."""
     sourced = os.environ.get("AMENT_PREFIX_PATH", "")
     return [Path(sys.prefix), *(Path(prefix) for prefix in sourced.split(os.pathsep) if prefix)]
 
 
 def installed_file(type_name: str, suffix: str) -> Path | None:
-    """The file of a type, definition (.msg) or description (.json), in the installed ROS 2; None if there is none."""
+    """Return the file of a type, definition (.msg) or description (.json), in the installed ROS 2; None if missing."""
     candidates = (prefix / "share" / f"{type_name}{suffix}" for prefix in ros_prefixes())
     return next((path for path in candidates if path.is_file()), None)
 
 
 def definition_texts() -> dict[str, str]:
-    """The .msg text of every type, by type name.
+    """Return the .msg text of every type, by type name.
 
     Raises:
         FileNotFoundError: a standard definition is not installed.
@@ -70,7 +70,7 @@ def definition_texts() -> dict[str, str]:
 
 
 def type_hashes(texts: dict[str, str]) -> dict[str, str]:
-    """The RIHS01 hash of every type, by type name."""
+    """Return the RIHS01 hash of every type, by type name."""
     store = get_typestore(Stores.EMPTY)
     types = {}
     for name, text in texts.items():
@@ -80,7 +80,7 @@ def type_hashes(texts: dict[str, str]) -> dict[str, str]:
 
 
 def generate() -> str:
-    """The content of message_types.json."""
+    """Return the content of message_types.json."""
     texts = definition_texts()
     hashes = type_hashes(texts)
     table = {name: {"hash": hashes[name], "text": text} for name, text in texts.items()}
