@@ -94,7 +94,7 @@ class CompiledTask:
     def with_scans(self, scans: Scans, scans_forced: Scans) -> CompiledTask:
         """Return the same task with other forms of ``scans`` and ``scans_forced``, which give the same bits.
 
-        While variables are held the task scans in the compiler's own form (decision): nothing is built during a run.
+        While variables are held the task scans in the compiler's own form (decision): nothing is built amid a run.
         """
 
         def again(held: frozenset[str]) -> CompiledTask:

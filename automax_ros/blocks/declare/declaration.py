@@ -74,7 +74,7 @@ UDC_ONLY = frozenset({Platform.UDC})
 
 
 class Form(enum.Enum):
-    """How a parameter may be written."""
+    """The forms in which a parameter may be written."""
 
     ANY = "variable or literal"
     VARIABLE = "variable only"

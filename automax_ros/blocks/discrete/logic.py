@@ -93,7 +93,7 @@ LATCH = Block(
 
 
 def transition_step(input: bool, last: bool) -> tuple[bool, bool]:
-    """Set OUTPUT on the one scan on which INPUT goes on; INPUT counts as FALSE before the first scan (37, decision)."""
+    """Set OUTPUT for the scan in which INPUT becomes TRUE; before the first scan it counts as FALSE (37, decision)."""
     output = input and not last
     last = input
     return output, last

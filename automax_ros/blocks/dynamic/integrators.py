@@ -52,7 +52,7 @@ def integrate_step(
 
     A hold keeps the integrator from moving in its direction, then the limits act, clamped to the range of section 51;
     LIMIT_PLUS comes last and wins. While RESET is TRUE, INITIAL_VALUE is shown as it is, even beyond a
-    limit or the range, and the next free scan limits it; the history of INPUT goes on (decisions). SATURATED compares
+    limit or the range, and the next free scan limits it; the history of INPUT continues (decisions). SATURATED compares
     OUTPUT as shown, not the range of section 51 (decision).
     """
     if reset:
@@ -154,7 +154,7 @@ def prop_int_step(
 
     Holds act on INTEGRATOR, then the limits, clamped to the range of section 51, LIMIT_PLUS last, so that it never
     winds up; then the limits act on OUTPUT. A coefficient that changes does not change INTEGRATOR. While RESET is TRUE
-    both are INITIAL_VALUE, even beyond a limit, and the history of INPUT goes on (decisions).
+    both are INITIAL_VALUE, even beyond a limit, and the history of INPUT continues (decisions).
     """
     if reset:
         integrator = float(initial_value)

@@ -26,7 +26,7 @@ RECOVERY_US: Final = 500
 VD0: Final = 1.3505
 """Ideal mean voltage of a bridge over the line-to-line voltage: 3 sqrt(2) / pi."""
 PRESET: Final = 0.6
-"""Largest part of a scan that a preset lets conduct, by the law of ``regulator`` (decision)."""
+"""Largest conducting part of a scan after a preset, by the law of ``regulator`` (decision)."""
 HIGHEST_COS: Final = 0.95
 """Alpha of a preset lies between the angles of this cosine (decision)."""
 

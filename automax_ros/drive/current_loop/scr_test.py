@@ -24,7 +24,7 @@ from automax_ros.drive.current_loop.signals import RATED, Measured, Pulse, gate_
 CYCLES: Final = 9
 """Line cycles for which a bridge is tested (52.3.1)."""
 STEP_NS: Final = 100_000
-"""How much DELTA grows from cycle to cycle, ns: 0 to 800 us (decision: equal steps)."""
+"""Increase of DELTA from cycle to cycle, ns: 0 to 800 us (decision: equal steps)."""
 PULSE_NS: Final = 100_000
 """Length of the gate pulse, ns (decision)."""
 THRESHOLD: Final = RATED * 5 // 100

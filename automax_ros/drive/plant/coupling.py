@@ -1,6 +1,6 @@
 """Two motors on one shaft, or on two shafts with a spring or a gear between them, each fed by its own circuit.
 
-Plants whose shafts are coupled advance together: to advance one of them advances both.
+Plants whose shafts are coupled advance together: advancing one of them advances both.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ from automax_ros.drive.plant.plant import RAD_S_PER_RPM, DrivePlant
 from automax_ros.drive.plant.signals import tach_rpm
 
 COUNTED_NS: Final = 20_000_000
-"""How long the circuit counts pulses, ns (decision: longer than a feed and a scan take, so an OSV_FDBK that is sound
-trips first)."""
+"""Time for which the circuit counts pulses, ns (decision: longer than a feed and a scan take, so an OSV_FDBK that is
+sound trips first)."""
 FULL: Final = 4095
 """Counts of full speed (52.1.5, SPEED_FDBK)."""
 NEVER: Final = -1
