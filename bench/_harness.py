@@ -1,4 +1,4 @@
-"""What the benchmarks share: a task made from text, and times of works that are run in turn."""
+"""Shared by the benchmarks: a task made from text, and times of measured functions that are run in turn."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from automax_ros.runtime.memory.views import ViewSpec
 from automax_ros.runtime.tasks.task import Task
 
 SECONDS = 1.0
-"""How long a measurement of short runs takes, s: a host that changes its speed has its best at some time in it."""
+"""Length of a measurement of short runs, s: long enough for a host of varying speed to reach its best."""
 FASTEST = 0.1
-"""The part of the rounds that counts: other work on the machine disturbs those little."""
+"""The part of the rounds that counts, the fastest ones: other work on the machine disturbs them little."""
 ANSWER = "--answer"
-"""The argument with which a program of bench/ answers questions of the one that has started it."""
+"""The argument with which a program of bench/ answers the questions of the process that started it."""
 
 
 class Loop(NamedTuple):
-    """Passes that are timed, a millisecond or less of them: with what is measured, and without it."""
+    """Passes to be timed, a millisecond or less: ``whole`` with the measured code, ``rest`` without it."""
 
     whole: Callable[[], object]
     rest: Callable[[], object]
-    """Its time is taken off."""
+    """Its time is subtracted."""
     passes: int
 
 
 def task_of(text: str, target: Platform = Platform.AUTOMAX) -> tuple[Task, CommonMemory]:
-    """Return a task in RUN with a common memory of just the variables that it declares."""
+    """Return a task in RUN with a common memory of only the variables that it declares."""
     source = SourceText("BENCH.BLK", text)
     result = check(source, name="BENCH", catalogue=CATALOGUE, target=target)
     if result.program is None:
@@ -56,8 +56,8 @@ def task_of(text: str, target: Platform = Platform.AUTOMAX) -> tuple[Task, Commo
 def ns_in_turn(loops: Sequence[Loop], seconds: float = SECONDS) -> list[float]:
     """Return the time of one pass of each loop, ns.
 
-    All are run in turn, round by round. What is subtracted is of one round, and what is compared is of the same rounds,
-    the fastest ones, of which the median counts: a host that changes its speed changes it for all alike.
+    All are run in turn, round by round. Times are subtracted within a round, and loops are compared by the median of
+    the same fastest rounds: so a host of varying speed affects all alike.
     """
     works = [work for loop in loops for work in (loop.rest, loop.whole)]
     rounds: list[list[int]] = []
@@ -107,20 +107,20 @@ def scan_ns(task: Task, vary: Callable[[int], object] = still) -> float:
 
 
 def seconds_in_turn(works: Sequence[Callable[[int], float]], repeats: int) -> list[float]:
-    """Return the least of the seconds that each work tells of its runs, all in turn; each is given the round."""
+    """Return the least time that each function returns for its runs, all in turn, s; each is passed the round."""
     rounds = [[work(number) for work in works] for number in range(repeats)]
     return [min(taken) for taken in zip(*rounds, strict=True)]
 
 
 def wall_s(work: Callable[[], object]) -> float:
-    """Return the wall time of work, s."""
+    """Return the wall time of a call, s."""
     began = time.perf_counter()
     work()
     return time.perf_counter() - began
 
 
 class Other:
-    """A program of bench/ in a process of its own, in another form than this one: it answers while this one waits."""
+    """A program of bench/ in a separate process and another form than this one: it answers while this one waits."""
 
     def __init__(self, file: str, form: Mapping[str, str]) -> None:
         command = [sys.executable, file, ANSWER]
@@ -133,7 +133,7 @@ class Other:
         self._process.communicate()
 
     def __call__(self, question: str) -> float:
-        """Return what its ``answer`` says to a question of one line."""
+        """Return the reply of its ``answer`` to a question of one line."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         print(question, file=self._process.stdin, flush=True)
@@ -144,6 +144,6 @@ class Other:
 
 
 def answer(measure: Callable[[str], float]) -> None:
-    """Answer the questions of the process that has started this one, until it has no more."""
+    """Answer the questions of the process that started this one, until there are no more."""
     for line in sys.stdin:
         print(measure(line.strip()), flush=True)

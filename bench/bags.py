@@ -1,4 +1,4 @@
-"""What recordings cost: encoding, writing, reading, exporting, and the share of a rack's time that recording takes."""
+"""Costs of recordings: encoding, writing, reading, exporting, and the share of a rack's time that recording takes."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def print_recording(folder: Path) -> None:
 
 
 def run_seconds(folder: Path | None, compression: str = "zstd") -> float:
-    """Return the wall time in seconds of a simulated run of the example rack, with the closing of the bag."""
+    """Return the wall time in seconds of a simulated run of the example rack, including the closing of the bag."""
     config = load(RACK).config
     assert config is not None
     rack = Rack(config)
@@ -122,7 +122,7 @@ def run_seconds(folder: Path | None, compression: str = "zstd") -> float:
 
 
 def print_share_of_a_rack(folder: Path) -> None:
-    """Print what recording adds to a simulated run: the best of several runs each."""
+    """Print the time that recording adds to a simulated run: the best of several runs each."""
     config = load(RACK).config
     assert config is not None
     scans = scans_per_second(Rack(config)) * SECONDS

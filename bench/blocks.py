@@ -1,8 +1,8 @@
-"""Time of each block in a compiled scan, over the 7010 Processor's (J-3676-5, Table 4). Prints ratios, fails on none.
+"""Time of each block in a compiled scan, over the 7010 Processor's (J-3676-5, Table 4). Prints ratios, never fails.
 
 Each block is programmed with every parameter: inputs are variables that change from scan to scan where the block allows
 it, all outputs are wired. Coefficients of dynamic blocks are literals, which cost nothing in a scan. The cost of the
-empty scan is taken off. A table of its own tells, as information, what a REAL coefficient costs that changes in every
+empty scan is subtracted. A separate table shows, as information, the cost of a REAL coefficient that changes in every
 scan, so that all coefficients of the block are computed again.
 """
 
@@ -17,7 +17,7 @@ from automax_ros.core.types import DataType
 
 COPIES = 40
 FEW_COPIES = 2
-"""Of blocks that take so long that fewer are enough."""
+"""Copies of blocks that take so long that fewer are enough."""
 COEFFICIENTS = {
     **dict.fromkeys(("KP", "KI"), "0.5"),
     **dict.fromkeys(("WLG", "WM", "WN"), "20.0"),
@@ -41,7 +41,7 @@ TABLE = 16
 
 
 def literal_of(item: Input) -> str:
-    """Return a sensible literal for an input that must or should be one."""
+    """Return a sensible literal for an input that must or should be a literal."""
     if item.name == "ORDER":
         return str(item.one_of[-1])
     if item.name in COEFFICIENTS:
@@ -53,7 +53,7 @@ def literal_of(item: Input) -> str:
 
 
 def variable_of(block: Block, item: Input) -> str:
-    """Return the variable that an input is given."""
+    """Return the variable for an input."""
     if item.name == "COLUMN":
         return "COLUMN_W%"
     if item.type is DataType.DOUBLE:
@@ -66,7 +66,7 @@ def variable_of(block: Block, item: Input) -> str:
 
 
 def call_text(block: Block, number: int, changing: str = "") -> tuple[str, list[str]]:
-    """Return one CALL with every parameter, and the variables it needs; ``changing`` is the input that COEF goes to."""
+    """Return one CALL with every parameter, and the variables it needs; ``changing`` is the input that gets COEF."""
     parts, variables = [], []
     for item in block.inputs:
         if item.type is Special.TABLE:
@@ -149,7 +149,7 @@ def _varied(text: str, target: Platform, coefficient: float | None = None) -> Lo
 
 
 def manual_us(block: Block) -> float:
-    """Return the time of the block as it is programmed here: the 7010's, the UDC's where only that runs it."""
+    """Return the manual's time of the block as programmed here: on the 7010, or the UDC where only that runs it."""
     time = block.times.model_7010 or block.times.udc
     assert time is not None
     channels = sum(item.name[-1].isdigit() for item in block.inputs)
@@ -227,7 +227,7 @@ PROGRAM_BLOCKS = 40
 
 
 def program_ns() -> float:
-    """Return the time of one scan of the program of 40 blocks, latch and write-back included."""
+    """Return the time of one scan of the program of 40 blocks, including latch and write-back."""
     task, memory = task_of(PROGRAM)
     views = [memory.view(name) for name in ("LINE_SP%", "FDBK%", "COUNT%", "START@", "READY@")]
     memory.write_from_outside(views[0], 3000, 1)

@@ -1,8 +1,8 @@
 """Figures of a rack in many processes on this machine: skipped scans, and write-to-latch from process to process.
 
 `bench/distributed.py [SECONDS]`: 60 s of four Processors at 5.5 ms, a drive, a UDC and inputs in 7 processes; then 20 s
-of a Processor that counts at 5.5 ms and one that looks at the count each 0.5 ms. Latency is the rack time from the scan
-that writes to the first scan of the other process that sees it: what a task of another Processor has to reckon with.
+of a Processor that counts at 5.5 ms and one that reads the count each 0.5 ms. Latency is the rack time from the scan
+that writes to the first scan of the other process that reads the new value.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def run(folder: Path, rack: Path, seconds: int, *options: str) -> dict:
 
 
 def skipped(seconds: int) -> None:
-    """Print how many scans each task of seven processes has skipped."""
+    """Print how many scans each task of the seven processes has skipped."""
     with tempfile.TemporaryDirectory() as temporary:
         report = run(Path(temporary), LINE, seconds)
     print(f"{len(report['processes'])} processes, {seconds} s:")
@@ -59,7 +59,7 @@ def skipped(seconds: int) -> None:
 
 
 def latencies() -> list[float]:
-    """Return the times in us from a write to the first scan of another process that has seen it."""
+    """Return the times in us from a write to the first scan of another process that reads the new value."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         (folder / "rack.yaml").write_text(RACK)
@@ -76,7 +76,7 @@ def latencies() -> list[float]:
                     first.setdefault(int(value), scan.stamp)
     reached = sorted(seen.items(), reverse=True)
     found, best = [], None
-    # A look that comes after several writes has seen them all.
+    # A read after several writes counts for all of them.
     for value in sorted(written, reverse=True):
         while reached and reached[0][0] >= value:
             best = reached.pop(0)[1]

@@ -1,7 +1,7 @@
 """Simulated seconds per wall second of line, bridge and motor: with a trivial controller, with CML, in a rack, by RK4.
 
-The first table has both forms side by side, each in a process of its own: compiled ahead of time (where it is built and
-fresh), and plain Python. Then details of the form that this process runs.
+The first table has both forms side by side, each in a separate process: compiled ahead of time (where it is built and
+up to date), and plain Python. Then follow details of the form that this process runs.
 """
 
 from __future__ import annotations
@@ -44,45 +44,45 @@ FIRINGS_PER_S = 360
 STEP_S = 20e-6
 SOURCE_OHM = 0.003
 CASES = (("rated torque, continuous current", 1.0, 1.0), ("5 % torque, discontinuous current", 0.05, 0.05))
-"""What is run: load torque and current reference over rated."""
+"""The cases: load torque and current reference over rated."""
 LOOP_CASES = (("60 % of LIM_BAR, continuous current", 2457), ("8 % of LIM_BAR, discontinuous current", 328))
-"""What the current minor loop is asked for: the reference in counts, at a held speed."""
+"""The cases of the current minor loop: the reference in counts, at a held speed."""
 SHORT_FIRINGS = 180
 RACK_S = 1.0
-"""Rack time of a run that is measured, s: a recording ends two chunks in it."""
+"""Rack time of a measured run, s: a recording ends two chunks in it."""
 BUDGET_S = 5.0
 """Wall time that each figure of the first table may take."""
 TURNS = 5
-"""Parts of it, in which both forms are measured in turn."""
+"""Parts of this time in which both forms are measured in turn."""
 WANTED = {"drive at rated torque": 1000, "drive with CML": 300}
 RACK = Path(__file__).parent.parent / "config" / "dc_drive" / "rack.yaml"
 PAIRS = [mask_of((number + 1, (number - 1) % 6 + 1)) for number in range(6)]
-"""What is fired one after the other, as the 57C406 has it."""
+"""The pairs of SCRs fired one after the other, as by the 57C406."""
 LIM_BAR = 150
 HELD_RPM = 900.0
 
 
 class Controller:
-    """The least that keeps a current: the delay of firing moves in proportion to the error of the mean."""
+    """The simplest current controller: the firing delay moves in proportion to the error of the mean."""
 
     def __init__(self, reference: float) -> None:
         self.wanted = reference * PARAMETERS.amps
         self.alpha_us = 2000.0
 
     def next_ns(self, number: int, mean_a: float) -> int:
-        """Return the delay of a firing after its natural commutation, ns, by the mean current until the last."""
+        """Return the instant of a firing, ns, with the delay adjusted by the mean current up to the last one."""
         self.alpha_us = min(max(self.alpha_us - 0.05 * (self.wanted - mean_a), 300.0), 5000.0)
         return number * 25_000_000 // 9 + int(self.alpha_us * 1000)
 
 
 def circuit_of(torque: float) -> Circuit:
-    """Return a circuit with a motor that turns at a load torque over the rated one."""
+    """Return a circuit with a turning motor and a load torque over the rated one."""
     line = AcLine(PARAMETERS.line_v, inductance_h=PARAMETERS.source_h, resistance_ohm=SOURCE_OHM, angle_rad=-pi / 3)
     return Circuit(line, Bridge(), Motor(PARAMETERS.motor, load=torque * TORQUE, speed_rad_s=START_RAD_S))
 
 
 def fastest(run: Callable[[], float]) -> float:
-    """Return the least wall time (s) of many short runs: those that other work has disturbed do not count."""
+    """Return the least wall time (s) of many short runs: those disturbed by other work do not count."""
     end, best = time.perf_counter() + BUDGET_S / TURNS, float("inf")
     while time.perf_counter() < end:
         gc.collect()
@@ -93,18 +93,18 @@ def fastest(run: Callable[[], float]) -> float:
 
 
 Measured = Generator[float, None, None]
-"""Gives simulated s per wall s each time that it is asked."""
+"""Yields simulated s per wall s, one measurement per request."""
 
 
 def plant_rate() -> Measured:
-    """Give simulated s per wall s of the circuit at rated torque; nothing is timed within a run."""
+    """Yield simulated s per wall s of the circuit at rated torque; nothing is timed within a run."""
     circuit, controller = circuit_of(1.0), Controller(1.0)
     number, mean = 0, 0.0
 
     def run() -> float:
         nonlocal number, mean
         began = time.perf_counter()
-        for number in range(number, number + SHORT_FIRINGS):  # noqa: B020 - goes on where the last run ended
+        for number in range(number, number + SHORT_FIRINGS):  # noqa: B020 - continues where the last run ended
             on_ns = controller.next_ns(number, mean)
             circuit.advance(on_ns)
             mean = circuit.sample().mean_current_a
@@ -117,13 +117,13 @@ def plant_rate() -> Measured:
 
 
 def loop_rate() -> Measured:
-    """Give simulated s per wall s of plant, 57C406 and current minor loop in continuous current."""
+    """Yield simulated s per wall s of plant, 57C406 and current minor loop in continuous current."""
     while True:
         yield 0.2 / fastest(lambda: loop(LOOP_CASES[0][1], 0.2)[0])
 
 
 def rack_rate(*, recorded: bool = False) -> Measured:
-    """Give simulated s per wall s of the whole example rack with a drive, once its motor turns."""
+    """Yield simulated s per wall s of the whole example rack with a drive, once its motor turns."""
     config = load(RACK).config
     assert config is not None
     rack = Rack(config)
@@ -148,7 +148,7 @@ RATES: dict[str, Callable[[], Measured]] = {
 
 
 def forms() -> None:
-    """Print the rates in both forms, and how many times quicker the compiled one is."""
+    """Print the rates in both forms, and how many times faster the compiled one is."""
     print(f"{'simulated s per wall s':34}{'compiled':>10}{'plain':>8}{'ratio':>8}{'wanted':>8}")
     with Other(__file__, {}) as ahead, Other(__file__, {"AUTOMAX_COMPILED": "off"}) as plain:
         for name in RATES:
@@ -158,7 +158,7 @@ def forms() -> None:
 
 
 def asked(under_way: dict[str, Measured], name: str) -> float:
-    """Return what is measured next of a rate; another one's rack is put down."""
+    """Return the next measurement of a rate; the rack of another rate is closed."""
     if name not in under_way:
         for measured in under_way.values():
             measured.close()
@@ -237,7 +237,7 @@ def loop(reference: int, seconds: float) -> tuple[float, int, list[int]]:
 def runge_kutta(rated: float, reference: float, seconds: float) -> tuple[float, float]:
     """Run the same circuit at a fixed step; return wall seconds and the final speed.
 
-    Two or three SCRs conduct; firing, end of overlap and extinction fall on the grid.
+    Two or three SCRs conduct; firing, end of overlap and extinction are on the grid.
     """
     data: MotorData = PARAMETERS.motor
     peak, omega, ls, rs = sqrt(2) * PARAMETERS.line_v, 2 * pi * 60, PARAMETERS.source_h, SOURCE_OHM
@@ -246,7 +246,7 @@ def runge_kutta(rated: float, reference: float, seconds: float) -> tuple[float, 
     overlap, number = False, -1
 
     def slope(t: float, current: float, share: float, speed: float) -> tuple[float, float, float]:
-        """Current, what the incoming SCR carries over half of it, speed: their rates."""
+        """Return the rates of current, of the incoming SCR's current over half of it, and of speed."""
         volts, n, over = peak * sin(omega * t - (number - 1) * pi / 3), 2.0, 0.0
         if overlap:
             before = peak * sin(omega * t - (number - 2) * pi / 3)

@@ -1,7 +1,7 @@
-"""What a hostile program costs a rack: scans skipped while it sends, next to idle, and memory. Fails on none.
+"""Effect of a hostile program on a rack: scans skipped while it sends, compared with idle, and memory. Never fails.
 
-The attacker is the tests' (``test/system/hostile.py``): 10 MB messages, 10,000 messages per second, malformed CDR,
-large and many requests. It and DDS's own threads need a core themselves.
+The attacker is that of the tests (``test/system/hostile.py``): 10 MB messages, 10,000 messages per second, malformed
+CDR, large and many requests. It and DDS's own threads need a core themselves.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ TASK = "processor_2: COPY"
 
 
 class Watch:
-    """The scans of the rack, as ``/diagnostics`` tells them."""
+    """The scans of the rack, from ``/diagnostics``."""
 
     def __init__(self) -> None:
         import rclpy
@@ -60,7 +60,7 @@ def resident_mb(pid: int) -> float:
 
 
 def attacked(kind: str) -> None:
-    """Let the attacker do one thing; ``idle`` is nothing."""
+    """Run one kind of attack; ``idle`` only waits."""
     if kind == "idle":
         time.sleep(IDLE_S)
     else:

@@ -1,6 +1,6 @@
-"""Native scans: the program of 40 blocks in each form, coefficients that change, and how long it takes to make them.
+"""Native scans: the program of 40 blocks in each form, coefficients that change, and the time to build them.
 
-Printed next to Python's own time in the same run; the manual's times are those of the 7010 (section 53).
+Printed next to the time of Python in the same run; the manual's times are those of the 7010 (section 53).
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ def columns_of(native: NativeTask, changes: dict[str, Callable[[int], int]], cou
 
 
 def called(compiled: CompiledTask, *, logged: bool = False) -> Loop:
-    """Return scans that a task executes in the form that it is given.
+    """Return scans of a task in a form.
 
     Args:
         compiled: the form of the program of 40 blocks.
-        logged: whether the write log is kept, as the nodes and a recording ask.
+        logged: whether the write log is kept, as the nodes and a recording require.
     """
     task, memory = task_of(PROGRAM)
     task.install(compiled)
@@ -78,7 +78,7 @@ def called(compiled: CompiledTask, *, logged: bool = False) -> Loop:
 
 
 def nexts(form: Callable[..., object], compiled: CompiledTask, count: int = 500) -> Loop:
-    """Return ``next`` alone, with memory that costs nothing: what latched is always one tuple."""
+    """Return only the calls of ``next``, with memory that costs nothing: the latched values are always one tuple."""
 
     class Still:
         latched = tuple(type_of_name(name).zero for name in compiled.latched)
@@ -87,10 +87,10 @@ def nexts(form: Callable[..., object], compiled: CompiledTask, count: int = 500)
             return self.latched
 
         def commit(self, changes: object) -> None:
-            """Drop them."""
+            """Discard the changes."""
 
         def log(self, line: int, code: int) -> None:
-            """Drop it."""
+            """Discard the error."""
 
     scans: Any = form(compiled.layout.fresh(), Still())
 
@@ -106,14 +106,14 @@ def nexts(form: Callable[..., object], compiled: CompiledTask, count: int = 500)
 
 
 def built_s(text: str, level: str) -> float:
-    """Return how long the compiler takes for a text, s."""
+    """Return the compiler's time for a text, s."""
     began = time.perf_counter()
     build(text, find_compiler(), (level,))
     return time.perf_counter() - began
 
 
 def long_text(lines: int) -> str:
-    """Return a task of that many lines: blocks and statements of each kind, over and over."""
+    """Return a task of this many lines: blocks and statements of each kind, repeated."""
     kinds = [
         "CALL SCALE(INPUT=A%, INPUT_MAX=4095, INPUT_MIN=0, OUTPUT_IMAX=4000, OUTPUT_IMIN=0, OUTPUT=B%)",
         "CALL LAG(INPUT=B%, WLG=5.0, OUTPUT=C%)",
@@ -131,7 +131,7 @@ def long_text(lines: int) -> str:
 
 
 def report_making(name: str, text: str) -> None:
-    """Print how long translation and compiler take for a task, and how long it takes where both are in the cache."""
+    """Print the times of translation and compiler for a task, and the time where both are in the cache."""
     compiled = task_of(text)[0].compiled
     began = time.perf_counter()
     source = translate(compiled)

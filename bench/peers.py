@@ -1,14 +1,14 @@
-"""This emulator next to others that install from registries, in one run; whoever is not installed is left out.
+"""This emulator compared with others that install from registries, in one run; those not installed are left out.
 
-    pip install mcap motulator          (the simulator wants numpy and scipy)
+    pip install mcap motulator          (the simulator needs numpy and scipy)
     apt install ngspice
 
 - a DC motor of 150 hp on a six-pulse bridge at rated torque: our circuit in closed form, ngspice with its switches;
 - motulator, the nearest simulator of drives in Python: an induction motor with V/Hz control (it has no SCR bridge);
-- messages of 100 bytes into an mcap file: our writer, mcap's own.
+- messages of 100 bytes into an mcap file: our writer, and that of mcap.
 
-No compiler of IEC 61131-3 installs from PyPI, npm, crates.io or Debian (crates.io has a parser): bench/native.py holds
-our native scans against the plain Python ones instead.
+No compiler of IEC 61131-3 installs from PyPI, npm, crates.io or Debian (crates.io has a parser): bench/native.py
+compares our native scans with the plain Python ones instead.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ REPEATS = 3
 
 
 def spice_netlist() -> str:
-    """Return the circuit of ``drive.drive`` with a fixed delay of 30 degrees and the speed that follows."""
+    """Return the circuit of ``drive.drive`` with a fixed delay of 30 degrees and the resulting speed."""
     data, volts, source_h = drive.PARAMETERS.motor, drive.PARAMETERS.line_v, drive.PARAMETERS.source_h
     peak, hz = volts * (2 / 3) ** 0.5, 60.0
     lines = ["six-pulse bridge and DC motor"]
@@ -60,7 +60,7 @@ def spice_netlist() -> str:
         f"rarm p x {data.resistance_ohm}",
         f"lm x y {data.inductance_h} ic={torque_a}",
         "vm y e 0",
-        # Speed as the volts of a capacitor: what the motor's current leaves over, over its inertia.
+        # Speed as the voltage of a capacitor: the integral of the excess torque over the inertia.
         f"be e n v=v(w)*{data.k_v_s}",
         f"bw 0 w i=i(vm)*{data.k_v_s}-{drive.TORQUE}-v(w)*{data.viscous_n_m_s}",
         f"cw w 0 {data.inertia_kg_m2} ic={drive.START_RAD_S}",
@@ -93,7 +93,7 @@ def spice() -> float | None:
 
 
 def motulator() -> float | None:
-    """Return the same of motulator, by its own example of a 2.2 kW motor."""
+    """Return the same for motulator, with its own example of a 2.2 kW motor."""
     if importlib.util.find_spec("motulator") is None:
         return None
     import motulator.drive.control.im as control  # type: ignore[import-not-found,unused-ignore]
@@ -113,7 +113,7 @@ def motulator() -> float | None:
 
 
 def closed_form() -> float:
-    """Return the same of our circuit at rated torque."""
+    """Return the same for our circuit at rated torque."""
     return max(DRIVE_SECONDS / drive.drive(1.0, 1.0, DRIVE_SECONDS)[0] for _ in range(REPEATS))
 
 
@@ -132,7 +132,7 @@ def own_writer(folder: Path) -> float:
 
 
 def mcap_writer(folder: Path) -> float:
-    """Return the same of the package mcap."""
+    """Return the same for the package mcap."""
     from mcap.writer import CompressionType, Writer
 
     folder.mkdir()
@@ -149,7 +149,7 @@ def mcap_writer(folder: Path) -> float:
 
 
 def best_rates(writers: Sequence[Callable[[Path], float]]) -> list[float]:
-    """Return the best of some files of each writer, in turn, in folders that are gone afterwards."""
+    """Return the best of several files of each writer, in turn, in temporary folders."""
     with tempfile.TemporaryDirectory() as temporary:
         rates = [
             [writer(Path(temporary) / f"{kind}_{number}") for kind, writer in enumerate(writers)]
@@ -159,7 +159,7 @@ def best_rates(writers: Sequence[Callable[[Path], float]]) -> list[float]:
 
 
 def show(what: str, own: float, unit: str, peers: dict[str, float | None]) -> None:
-    """Print our figure and what it is over each peer's."""
+    """Print our figure and its ratio to each peer's."""
     print(f"{what}: {own:,.0f} {unit}")
     for name, rate in peers.items():
         text = "not installed" if rate is None else f"{rate:,.3g} {unit}, ratio {own / rate:,.1f}"

@@ -1,6 +1,6 @@
 """Simulated seconds per wall second of the example rack, without and with recording, modeled, and in sweeps.
 
-Prints, fails on none.
+Prints figures, never fails.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def run(config: RackConfig, folder: Path | None, seconds: float = SECONDS, nativ
 
 
 def sweeps(config: RackConfig) -> None:
-    """Print how many short runs of the rack a sweep makes in a second, next to racks that are built and run alone."""
+    """Print how many short runs of the rack a sweep makes per second, and racks that are built and run one by one."""
     rack = Rack(config)
     varied = read_varied(rack, f"SPEED.KP_SPEED=5:80:{SWEEP_RUNS}")
     duration_ns = seconds_ns(SWEEP_SECONDS)
@@ -76,7 +76,7 @@ def sweeps(config: RackConfig) -> None:
 
 
 def sweep_s(plan: Plan, points: list[Point], jobs: int, _: int) -> float:
-    """Return the wall time of a sweep with its start, s."""
+    """Return the wall time of a sweep including its start, s."""
     return wall_s(lambda: run_sweep(plan, points, Workers(jobs)))
 
 
@@ -87,7 +87,7 @@ def asked(config: RackConfig, question: str) -> float:
 
 
 def an_hour(config: RackConfig) -> None:
-    """Print what an hour takes as ``automax run --simulated --record`` runs it, native scans in the cache, and bare."""
+    """Print the time of an hour run like ``automax run --simulated --record``, with cached native scans, and bare."""
     native = NativeForms(NativeMode.AUTO, seconds_ns(HOUR_S))
     Rack(config, native=replace(native, mode=NativeMode.ON))
     with tempfile.TemporaryDirectory() as temporary:
@@ -103,7 +103,7 @@ def an_hour(config: RackConfig) -> None:
 
 
 def forms(config: RackConfig) -> None:
-    """Print what a long recording costs in the form that runs here, and in plain Python in a process of its own."""
+    """Print the cost of a long recording in the form that runs here, and in plain Python in a separate process."""
     with Other(__file__, {"AUTOMAX_COMPILED": "off"}) as plain:
         ways: tuple[Callable[[str], float], ...] = (partial(asked, config), plain)
         works = [lambda _, ask=ask, what=what: ask(what) for ask in ways for what in ("recorded", "bare")]

@@ -1,4 +1,4 @@
-"""What a replay costs: the example rack, and five speed regulators that scan every 5.5 ms. Prints, fails on none."""
+"""Cost of a replay: the example rack, and five speed regulators that scan every 5.5 ms. Prints figures, never fails."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from automax_ros.replay.side_by_side import replay_side_by_side
 EXAMPLE = Path(__file__).parent.parent / "config" / "section_drive"
 SECONDS = 60
 SPLIT_SECONDS = 14_400
-"""Long enough for the start of a process, half a second, to matter little where native scans are replayed."""
+"""Long enough that the start of a process, half a second, matters little where native scans are replayed."""
 FILES = 16
 REPEATS = 3
 WANTED = 500
@@ -42,7 +42,7 @@ def config_of(file: Path) -> RackConfig:
 
 
 def five_regulators(folder: Path) -> RackConfig:
-    """Five times the example's speed regulator, each with commons of its own, every tick of 5.5 ms."""
+    """Return a rack with five of the example's speed regulator, each with its own commons, every tick of 5.5 ms."""
     text = (EXAMPLE / "SPEED.BLK").read_text().replace("SCAN_LOOP(TICKS=2)", "SCAN_LOOP(TICKS=1)")
     names = [name.strip() for line in _DECLARED.findall(text) for name in line.split(",")]
     lines = ["rack: BENCH", "slots:", "  0:", "    module: 57C435", "    tick_ms: 5.5", "    tasks:"]
@@ -60,7 +60,7 @@ def five_regulators(folder: Path) -> RackConfig:
 
 
 def plant(rack: Rack, step: int) -> None:
-    """Move the inputs of all five regulators, so that every scan has something new to latch."""
+    """Change the inputs of all five regulators, so that every scan latches new values."""
     for number in range(TASKS):
         rack.write(f"RUN{number}@", True)
         rack.write(f"SECT_REF{number}%", (step * 7 + number * 300) % 3000)
@@ -95,7 +95,7 @@ FORMS = (
     ("by columns, in Python", ReplayOptions()),
     ("by columns, native", ReplayOptions(native=NativeForms(NativeMode.ON))),
 )
-"""The ways of executing a recording again; each gives the same report."""
+"""The ways to execute a recording again; each gives the same report."""
 
 
 def print_replay(what: str, bag: Path, rate: float, new: Mapping[str, SourceText]) -> None:
@@ -117,7 +117,7 @@ def print_both(what: str, bag: Path, rate: float, name: str, text: str) -> None:
 
 
 def print_side_by_side(bag: Path, form: str, options: ReplayOptions) -> None:
-    """One job against two, each with its start: processes begun, tasks compiled."""
+    """Print the times of one job and of two, each including its start: processes started, tasks compiled."""
     replay = Replay(bag, {}, options)
     replay.run()
 

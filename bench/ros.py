@@ -1,8 +1,8 @@
-"""ROS figures of this machine: jitter of the rack's loop, and latency of a write from another process. Fails on none.
+"""ROS figures of this machine: jitter of the rack's loop, and latency of a write from another process. Never fails.
 
-The loop is the rack's own, a ``Pacer``, in three forms: without ROS, which is what the host itself gives; with the
-executor served between scans on the same thread; and as a rack has it, with the executor on a thread of its own.
-Latency is the time from a client's publish on ``/set`` to the latch that takes the value in, by the clocks of one host.
+The loop is the rack's own, a ``Pacer``, in three forms: without ROS, which shows the jitter of the host itself; with
+the executor served between scans on the same thread; and as in a rack, with the executor on a separate thread.
+Latency is the time from a client's publish on ``/set`` to the latch that reads the value, by the clocks of one host.
 """
 
 from __future__ import annotations

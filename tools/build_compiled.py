@@ -3,8 +3,8 @@
 tools/build_compiled.py [--folder FOLDER] [--group NAME]...     without FOLDER: site-packages of this interpreter
 
 Each group is translated to C by mypyc and compiled by the C compiler that Python names (or CC), on all cores. A group
-whose sources, compiler and options are those of the last time is kept. Without a compiler, or when a group cannot be
-built, everything works in plain Python: a line says so, and the exit code is 0.
+whose sources, compiler and options have not changed since the last build is kept. Without a compiler, or when a group
+cannot be built, everything works in plain Python: a line says so, and the exit code is 0.
 """
 
 from __future__ import annotations
@@ -38,10 +38,11 @@ FLAGS = (
     *("-O2", "-ffp-contract=off", "-fno-fast-math", "-fwrapv"),
     *("-fPIC", "-fvisibility=hidden", "-DNDEBUG", "-g0", "-w"),
 )
-"""Nothing that changes a result: no fused multiply-add, no reordered sums, integers wrap as in Python's own build. What
-is hidden is called directly, and may be inlined."""
+"""None of these changes a result: no fused multiply-add, no reordered sums, integers wrap as in Python's own build.
+Hidden functions are called directly, and may be inlined."""
 PART_BYTES = 600_000
-"""C that is compiled at once: headers are read a few times, modules are inlined in each other, all cores have work."""
+"""Bytes of C that are compiled at once: headers are read only a few times, modules are inlined in each other, and all
+cores have work."""
 TOOLS = ("build_compiled.py", "compiled_translate.py", "compiler_parts.py")
 NICE = 5
 
@@ -52,7 +53,7 @@ class NotBuiltError(Exception):
 
 @dataclass(frozen=True)
 class Compiler:
-    """The C compiler and the linker of extension modules as commands, and what the compiler says that it is."""
+    """The C compiler and the linker of extension modules as commands, and the version that the compiler prints."""
 
     compile: tuple[str, ...]
     link: tuple[str, ...]
@@ -80,7 +81,7 @@ def digest_of(path: Path) -> str:
 
 
 def stamp_of(group: Group, compiler: Compiler) -> str:
-    """Return what a group is made from, but for what its types come from: the index tells these."""
+    """Return a hash of all that a group is made from, except the sources of its types, which are in the index."""
     from mypy.version import __version__
 
     text = [sys.version, __version__, compiler.version, *compiler.compile, *compiler.link]
@@ -90,7 +91,7 @@ def stamp_of(group: Group, compiler: Compiler) -> str:
 
 
 def kept(folder: Path, group: Group, compiler: Compiler) -> list[str] | None:
-    """Return the lines of the index for a group that is there and still what would be built; None if it is not."""
+    """Return the lines of the index for a group that is installed and up to date; None if it is not."""
     facts = folder / f"{group.name}-{stamp_of(group, compiler)}" / compiled.INDEX
     try:
         lines = facts.read_text(encoding="utf-8").splitlines()
@@ -106,7 +107,7 @@ def kept(folder: Path, group: Group, compiler: Compiler) -> list[str] | None:
 
 
 def run(command: Sequence[str], folder: Path) -> None:
-    """Run a compiler; raise ``NotBuiltError`` with what it said last."""
+    """Run a compiler; raise ``NotBuiltError`` with its last messages if it fails."""
     done = subprocess.run(["nice", "-n", str(NICE), *command], cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         said = (done.stderr or done.stdout).strip().splitlines()
@@ -114,7 +115,7 @@ def run(command: Sequence[str], folder: Path) -> None:
 
 
 def translated(group: Group, work: Path) -> dict[str, Any]:
-    """Translate a group in a process of its own; return what it tells about it."""
+    """Translate a group in a separate process; return the facts that it writes."""
     done = subprocess.run(
         [sys.executable, str(ROOT / "tools" / "compiled_translate.py"), group.name, str(work)],
         cwd=ROOT, capture_output=True, text=True, check=False, env={**os.environ, compiled.VARIABLE: "off"},
@@ -171,12 +172,12 @@ def part_files(work: Path, files: Sequence[str]) -> list[str]:
 
 
 def placed(work: Path, folder: str, file: str) -> str:
-    """Return where a library will be, and its bytes, as the index has them."""
+    """Return the future place of a library and its size in bytes, as written in the index."""
     return f"{folder}/{file}\t{(work / file).stat().st_size}"
 
 
 def write_index(folder: Path, lines: list[str]) -> None:
-    """Replace the index at once, so that a program that starts now finds the old groups or the new ones."""
+    """Replace the index atomically, so that a program that starts meanwhile finds either the old groups or the new."""
     head = ["\t".join(("automax_ros compiled", compiled.VERSION, EXTENSION_SUFFIXES[0]))]
     temporary = folder / f"{compiled.INDEX}.new"
     temporary.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
@@ -188,7 +189,7 @@ def write_index(folder: Path, lines: list[str]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Build what has changed; return 0 also where nothing can be built."""
+    """Build the groups that have changed; return 0 also where nothing can be built."""
     parser = argparse.ArgumentParser(description="Build modules ahead of time; see the head of this file.")
     parser.add_argument("--folder", type=Path, default=Path(sysconfig.get_path("platlib")) / compiled.FOLDER)
     parser.add_argument("--group", action="append", choices=[group.name for group in GROUPS])

@@ -1,9 +1,9 @@
 """Builds automax_msgs into the virtual environment that runs it: .venv/bin/python tools/build_messages.py.
 
-What colcon does where ROS 2 is installed, `make setup` does with this: the generators and libraries come from PyPI
-wheels, gcc and g++ from the system. Installed are lib/libautomax_msgs__*.so, the Python package automax_msgs,
-share/automax_msgs with definitions and type hashes, and the entries of the ament index. A stamp with a hash of
-everything that the result depends on is written last, so an interrupted build is repeated and a finished one is not.
+`make setup` uses it in place of colcon, without an installed ROS 2: the generators and libraries come from PyPI wheels,
+gcc and g++ from the system. It installs lib/libautomax_msgs__*.so, the Python package automax_msgs, share/automax_msgs
+with definitions and type hashes, and the entries of the ament index. A stamp with a hash of everything that the result
+depends on is written last, so an interrupted build is repeated and a finished one is not.
 """
 
 import hashlib
@@ -24,13 +24,13 @@ TOOLS = Path(__file__).resolve().parent
 SOURCE = TOOLS.parent / "msg_defs"
 PREFIX = Path(sys.prefix)
 STAMP = PREFIX / "share" / NAME / "build.json"
-# Interface packages whose types ours use; CMakeLists.txt names the same.
+# Interface packages whose types ours use; the same as in CMakeLists.txt.
 DEPENDENCIES = ("builtin_interfaces", "service_msgs")
 RUN_DEPENDENCIES = ("builtin_interfaces", "rosidl_default_runtime", "service_msgs")
 
 
 def main() -> int:
-    """Build unless nothing changed; 0 if the messages are up to date, 1 with one line on stderr if they cannot be."""
+    """Build if something changed; return 0 if the messages are up to date, 1 with a line on stderr if not possible."""
     try:
         fingerprint = source_fingerprint()
         if is_current(fingerprint):
@@ -47,7 +47,7 @@ def main() -> int:
 
 
 def source_fingerprint() -> str:
-    """A hash of the definitions, these tools, the interpreter and the versions of the ROS packages.
+    """Return a hash of the definitions, these tools, the interpreter and the versions of the ROS packages.
 
     Raises:
         BuildError: no generators are installed here.
@@ -60,7 +60,7 @@ def source_fingerprint() -> str:
     for path in sorted([*definitions, *tools]):
         content = path.read_bytes()
         digest.update(f"{path.name} {len(content)} ".encode() + content)
-    # pip may be at work on other packages: one that is not whole yet has no name.
+    # pip may be installing other packages: an incomplete one has no name.
     versions = sorted(
         f"{name} {distribution.version}"
         for distribution in metadata.distributions()
@@ -73,7 +73,7 @@ def source_fingerprint() -> str:
 
 
 def is_current(fingerprint: str) -> bool:
-    """Whether a finished build of exactly these sources is installed with all its files."""
+    """Return whether a finished build of exactly these sources is installed with all its files."""
     try:
         stamp = json.loads(STAMP.read_text())
     except (OSError, ValueError):
@@ -93,7 +93,7 @@ def build(fingerprint: str) -> None:
 
 
 def install(package: Interfaces) -> list[str]:
-    """Copy the results into the prefix, without leftovers of an earlier build; returns their paths below it."""
+    """Copy the results into the prefix and remove leftovers of earlier builds; return their paths below it."""
     shutil.copyfile(package.folder / "package.xml", package.share / "package.xml")
     site_packages = Path(sysconfig.get_path("platlib"))
     files = replace_folder(package.share, PREFIX / "share" / NAME)
@@ -103,7 +103,7 @@ def install(package: Interfaces) -> list[str]:
 
 
 def replace_folder(source: Path, target: Path) -> list[Path]:
-    """Copy the files that matter at run time to `target`, and nothing else stays there."""
+    """Replace the folder `target` by the files of `source` that are needed at run time."""
     wanted = [
         path
         for path in sorted(source.rglob("*"))
@@ -123,7 +123,7 @@ def replace_file(source: Path, target: Path) -> Path:
 
 
 def write_index(package: Interfaces) -> list[Path]:
-    """The entries of the ament index by which ROS 2 programs find the package and its interfaces."""
+    """Write the entries of the ament index by which ROS 2 programs find the package and its interfaces."""
     stems = [(path.parent.name, path.stem) for path in package.definitions]
     interfaces = [f"{kind}/{stem}.{suffix}" for kind, stem in stems for suffix in ("idl", "json", kind)]
     entries = {

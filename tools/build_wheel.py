@@ -1,6 +1,6 @@
-"""Build a wheel that carries the modules compiled ahead of time: for this interpreter and this kind of machine.
+"""Build a wheel with the modules compiled ahead of time, for this interpreter and this kind of machine.
 
-tools/build_wheel.py [FOLDER]     without FOLDER it goes to dist/. Plain `pip wheel .` makes one of Python alone.
+tools/build_wheel.py [FOLDER]     without FOLDER it is written to dist/. Plain `pip wheel .` makes one of Python only.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from automax_ros.core import compiled
 
 
 def tag() -> str:
-    """Return the tag of what is compiled: this CPython, on this platform."""
+    """Return the tag of the compiled modules: this CPython, on this platform."""
     python = f"cp{sys.version_info.major}{sys.version_info.minor}"
     return f"{python}-{python}-{re.sub(r'[-.]', '_', sysconfig.get_platform())}"
 
 
 def plain_wheel(folder: Path) -> Path:
-    """Build the wheel of Python alone, with this environment's setuptools.
+    """Build the wheel of Python only, with this environment's setuptools.
 
-    What setuptools collects goes below ``folder``: a build/ that is there may hold modules that were removed since.
+    setuptools collects files below ``folder``: an existing build/ may contain modules that were removed since.
     """
     settings = folder / "build.cfg"
     settings.write_text(f"[build]\nbuild_base = {folder / 'build'}\n", encoding="utf-8")
@@ -77,7 +77,7 @@ def main() -> int:
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="automax_wheel") as temporary:
         modules = Path(temporary) / "modules"
-        with contextlib.suppress(FileNotFoundError):  # what is installed is taken over where it is still fresh
+        with contextlib.suppress(FileNotFoundError):  # installed groups are reused where they are up to date
             shutil.copytree(Path(sysconfig.get_path("platlib")) / compiled.FOLDER, modules)
         build_compiled.main(["--folder", str(modules)])
         if not list(modules.glob("*/*")):

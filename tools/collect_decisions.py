@@ -1,6 +1,6 @@
-"""Writes docs/decisions.md: what the project decided where the manuals are silent, from the marks in the package.
+"""Writes docs/decisions.md: the project's decisions where the manuals are silent, from the marks in the package.
 
-python tools/collect_decisions.py, after a mark was added or changed. A mark is "(decision)" in a sentence of a
+Run python tools/collect_decisions.py after a mark was added or changed. A mark is "(decision)" in a sentence of a
 docstring, a comment or a problem's page; "(decision: the reason)" and "(decision): the reason" say why.
 """
 
@@ -23,11 +23,11 @@ MARK = re.compile(
 )
 """A mark, with the section it interprets and the reason, where they are given."""
 SENTENCE = re.compile(r"(?<=\.)\s+(?=[\"'`(A-Z0-9])")
-"""Between two sentences of a paragraph."""
+"""The space between two sentences of a paragraph."""
 ITEM = re.compile(r"\n(?=[-*#] | +\w+: )")
-"""Before an item of a list, a heading, or an argument of a docstring."""
+"""The line break before an item of a list, a heading, or an argument of a docstring."""
 LONGEST_VALUE = 40
-"""Characters of a constant's value that are printed after its name."""
+"""Longest value of a constant that is printed after its name, in characters."""
 HEAD = """# Decisions
 
 What the emulator does where the manuals are silent, ambiguous or contradict themselves, and the bounds that it sets.
@@ -37,7 +37,7 @@ What the emulator does where the manuals are silent, ambiguous or contradict the
 
 
 class Decision(NamedTuple):
-    """A sentence that is marked: what was decided, why (or empty), the file below the package, and the name there."""
+    """A marked sentence: the decision, the reason (or empty), the file below the package, and the name in it."""
 
     statement: str
     reason: str
@@ -91,7 +91,7 @@ def marked(prose: str) -> Iterator[tuple[str, str]]:
 
 
 def texts_of(source: str) -> Iterator[tuple[int, str, str]]:
-    """Yield line, name and text of every docstring, docstring of an attribute, and run of comments."""
+    """Yield line, name and text of every docstring, attribute docstring, and run of comments."""
     tree = ast.parse(source)
     yield from docstrings(tree, "")
     for line, comment in comments(source):
@@ -141,7 +141,7 @@ def comments(source: str) -> Iterator[tuple[int, str]]:
 
 
 def name_at(tree: ast.Module, line: int) -> str:
-    """Return the name of the class, function or attribute that a line stands in."""
+    """Return the name of the class, function or attribute to which a line belongs."""
     names: list[str] = []
     body: list[ast.stmt] = tree.body
     while True:

@@ -1,4 +1,4 @@
-"""Which modules are compiled ahead of time: the one list, and how a change of it is noticed."""
+"""The list of the modules that are compiled ahead of time."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ PACKAGE = ROOT / "automax_ros"
 
 @dataclass(frozen=True)
 class Group:
-    """Modules that are translated together: inside a group calls are C, out of it they are Python's.
+    """Modules that are translated together: calls inside a group are C calls, those out of it Python calls.
 
-    ``folders`` are taken whole, with what is below them, but for ``without`` (files, relative to the package);
-    ``files`` are single ones. A group is loaded whole or not at all (decision): its modules know each other's memory.
+    ``folders`` are included with all files below them, except ``without`` (files, relative to the package); ``files``
+    are single ones. A group is loaded whole or not at all (decision): its modules depend on each other's memory layout.
     """
 
     name: str
@@ -23,7 +23,7 @@ class Group:
     without: tuple[str, ...] = ()
 
     def sources(self) -> list[Path]:
-        """Return the files of the group, in the order of their names; faces (``__init__``) stay plain."""
+        """Return the files of the group, in the order of their names; ``__init__`` files stay plain."""
         found = {path for folder in self.folders for path in (PACKAGE / folder).rglob("*.py")}
         found |= {PACKAGE / file for file in self.files}
         left = found - {PACKAGE / file for file in self.without}
@@ -32,7 +32,7 @@ class Group:
 
 _ASSESS = ("assessment", "drive_case", "drive_rules", "limits")
 _COLD = ("drive/base/nameplate.py", "drive/circuit/steady.py", *(f"drive/assess/{name}.py" for name in _ASSESS))
-"""What a drive's tools ask once: compiling takes longer than it saves."""
+"""Files that a drive's tools use only once: compiling takes longer than it saves."""
 
 _SCANS = (
     "runtime/scan/processor_time.py",
@@ -46,7 +46,7 @@ _SCANS = (
     "rack/tasks/scheduled_task.py",
     "rack/tasks/statistics.py",
 )
-"""What each scan goes through."""
+"""Files that each scan uses."""
 _RECORDING = (
     "messages/stream/templates.py",
     "messages/stream/rack_messages.py",
@@ -59,7 +59,7 @@ _RECORDING = (
     "recordings/write/recording.py",
     "recordings/write/writer.py",
 )
-"""What each message of a recording goes through."""
+"""Files that each message of a recording uses."""
 _DRIVES = (
     "runtime/tasks/cml_task.py",
     "runtime/scan/drive_record.py",
@@ -73,11 +73,11 @@ _DRIVES = (
     "rack/plants/feeding.py",
     "rack/plants/sampling.py",
 )
-"""What each interrupt of a 57C406 goes through, to the registers, and the instruments that look at a plant."""
+"""Files that each interrupt of a 57C406 uses, down to the registers, and the instruments that measure a plant."""
 
 GROUPS = (
     Group("drive", folders=("drive",), without=_COLD),
     Group("scans", files=(*_SCANS, *_RECORDING, *_DRIVES)),
 )
-"""What runs as machine code. ``sum`` of floating-point numbers must not stand in it (decision): Python 3.12 and later
-round once, at the end, where C rounds after each addition."""
+"""The groups that run as machine code. They must not use ``sum`` of floating-point numbers (decision): Python 3.12 and
+later round once, at the end, where C rounds after each addition."""

@@ -1,4 +1,4 @@
-"""Translate one group of modules to C by mypyc. A process of its own: mypyc keeps a global state.
+"""Translate one group of modules to C by mypyc, in a separate process, since mypyc has global state.
 
 tools/compiled_translate.py GROUP FOLDER     writes C into FOLDER, and FOLDER/facts.json
 """
@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-# setuptools first: mypyc looks whether it is there.
+# setuptools first: mypyc checks whether it is imported.
 import setuptools  # type: ignore[import-untyped]  # noqa: F401
 from compiled_groups import GROUPS, ROOT
 from mypy.fscache import FileSystemCache
@@ -41,11 +41,12 @@ PyMODINIT_FUNC PyInit_{last}(void)
     return begin ? begin() : NULL;
 }}
 """
-"""What Python calls to load a module: it asks the group's library for it. Each package has one file of these."""
+"""The function that Python calls to load a module: it gets the module from the group's library. Each package has one
+file of these."""
 
 
 def translate(name: str, folder: Path) -> dict[str, Any]:
-    """Write the C files of a group; return its modules, what else they were checked against, and its C files."""
+    """Write the C files of a group; return its modules, the others they were checked against, and its C files."""
     group = next(group for group in GROUPS if group.name == name)
     paths = [str(path.relative_to(ROOT)) for path in group.sources()]
     config = folder / "mypy.ini"
@@ -81,7 +82,7 @@ def translate(name: str, folder: Path) -> dict[str, Any]:
 
 
 def needs(result: Any, modules: set[str]) -> dict[str, str]:
-    """The other modules of the package that the group was checked against: their types are compiled in."""
+    """Return the other modules of the package that the group was checked against: their types are compiled in."""
     found: dict[str, str] = {}
     for module in modules:
         for other in result.graph[module].dependencies:
@@ -91,7 +92,7 @@ def needs(result: Any, modules: set[str]) -> dict[str, str]:
 
 
 def runtime(folder: Path, used: list[str]) -> list[str]:
-    """Copy mypyc's own C files to where the group's are; return those that all need, and what the group ``used``."""
+    """Copy mypyc's own C files next to the group's; return those that all need, and those that the group ``used``."""
     here = Path(include_dir())
     for path in here.rglob("*.[ch]"):
         target = folder / path.relative_to(here)
@@ -101,7 +102,7 @@ def runtime(folder: Path, used: list[str]) -> list[str]:
 
 
 def interfaces(used: list[str]) -> dict[str, list[int]]:
-    """The C interfaces of librt that a group ``used``: the binary version and the other one, by mypyc's headers."""
+    """Return the C interfaces of librt that a group ``used``, each with its ABI and API versions of mypyc's headers."""
     found: dict[str, list[int]] = {}
     for folder in {Path(file).parent for file in used}:
         header = Path(include_dir()) / folder / f"librt_{folder.name}.h"
@@ -113,7 +114,7 @@ def interfaces(used: list[str]) -> dict[str, list[int]]:
 
 
 def shims(library: str, modules: dict[str, str], folder: Path) -> dict[str, str]:
-    """Write the functions that Python calls, a file for each package of the group; return the file of each package."""
+    """Write the functions that Python calls, one file per package of the group; return the file of each package."""
     written: dict[str, str] = {}
     for package in sorted({module.rpartition(".")[0] for module in modules}):
         text = "#include <Python.h>\n" + "".join(

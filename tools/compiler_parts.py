@@ -1,4 +1,4 @@
-"""Divides C sources into parts, each compiled at once: headers are read a few times, and all cores have work."""
+"""Divides C sources into parts, each compiled at once: headers are read only a few times, and all cores have work."""
 
 from __future__ import annotations
 

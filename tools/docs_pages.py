@@ -1,4 +1,4 @@
-"""Pages of the reference that are written from the code as it is, when the site of the documentation is built."""
+"""Writes the pages of the reference that are generated from the code when the documentation site is built."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from automax_ros.core.problems import PROBLEMS
 ROOT = Path(__file__).resolve().parent.parent
 PROBLEM_PAGES = ROOT / "automax_ros" / "core" / "pages"
 BANDS = {"0": "Syntax", "2": "Types", "4": "Meaning", "6": "Files, racks and recordings", "7": "Run time"}
-"""What the first digit of a problem's code says (core/problems)."""
+"""Meaning of the first digit of a problem's code (core/problems)."""
 FIELD = re.compile(r"(?P<type>[\w/]+(?:<=\d+)?(?:\[[^\]]*\])?)\s+(?P<name>\w+)\s*(?P<value>=\s*.*|\S.*)?$")
 """A field of a message: its type, its name, the value of a constant or of a default."""
 
 
 def pages() -> dict[str, str]:
-    """Return every written file by its place in the site: pages, and the schemas for editors."""
+    """Return every generated file by its place in the site: pages, and the schemas for editors."""
     return {
         "reference/commands.md": command_page(),
         "reference/messages.md": message_page(),
@@ -55,14 +55,14 @@ def command_text(command: Command) -> str:
 
 
 def argument(option: Option) -> str:
-    """Return an argument as a cell of a table: its names, and what it takes."""
+    """Return an argument as a cell of a table: its names, and its values."""
     values = f" {','.join(option.values)}" if option.values else f" {option.metavar}" if option.metavar else ""
     names = ", ".join(f"`{name}{cell(values) if option.takes_value else ''}`" for name in option.names)
     return names or f"`{option.metavar}`"
 
 
 def prose(text: str) -> str:
-    """Return a help text as Markdown: indented lines, and those with columns, as they stand."""
+    """Return a help text as Markdown: indented lines, and those with columns, unchanged."""
     parts = re.split(r"\n\s*\n", text.strip("\n"))
     return "\n\n".join(f"```text\n{part}\n```" if re.search(r"^ |\S {2,}\S", part, re.M) else part for part in parts)
 
@@ -95,7 +95,7 @@ def definition(path: Path) -> str:
 
 
 def intro_and_fields(text: str) -> tuple[str, list[tuple[str, str, str]]]:
-    """Return the first comment of a definition, and of each field type, name and the comments over it."""
+    """Return the first comment of a definition, and type, name and preceding comments of each field."""
     intro, comments, fields = "", [], []  # type: tuple[str, list[str], list[tuple[str, str, str]]]
     for line in text.splitlines():
         if line.startswith("#"):
@@ -140,7 +140,7 @@ def codes(band: str) -> Iterator[str]:
 
 
 def link(code: str) -> str:
-    """Return a link to a problem's page, as the site has it."""
+    """Return a link to a problem's page in the site."""
     return f"[{code}](problems_{code[3]}.md#{code.lower()})"
 
 

@@ -1,7 +1,7 @@
-"""Makes the pictures of the documentation from a simulated run of the example rack, so that they stay true.
+"""Makes the pictures of the documentation from a simulated run of the example rack, so that they stay up to date.
 
-`.venv/bin/python tools/docs_pictures.py` writes them into docs/pictures/: what `automax report` and `automax plot`
-draw of the tour through config/dc_drive, and what the terminal shows while the rack runs. The same rack and the same
+`.venv/bin/python tools/docs_pictures.py` writes them into docs/pictures/: the drawings of `automax report` and
+`automax plot` for the tour through config/dc_drive, and the terminal while the rack runs. The same rack and the same
 matplotlib give the same bytes.
 """
 
@@ -24,9 +24,9 @@ RACK = ROOT / "config" / "dc_drive"
 PICTURES = ROOT / "docs" / "pictures"
 PLOTTED = ("SPEED_REF%", "SPD%", "CUR_REF%", "CUR_FB%", "BRIDGE@", "F_SCR@")
 SCREEN_S = (1, 3, 5, 8)
-"""Seconds of the run at which the line of status is shown."""
+"""Seconds of the run at which the status line is shown."""
 _LETTER, _LINE, _EDGE = 8.0, 19, 14
-"""Width of a letter and height of a line of the terminal, and the room around them, in pixels."""
+"""Width of a letter and height of a line of the terminal, and the margin around them, in pixels."""
 
 
 def make(folder: Path) -> None:
@@ -41,7 +41,7 @@ def make(folder: Path) -> None:
 
 
 def screen() -> str:
-    """Return the terminal of a run as SVG: the line of status at some instants."""
+    """Return the terminal of a run as SVG: the status line at some instants."""
     lines = ["$ make run", *status_lines()]
     width = round(2 * _EDGE + _LETTER * max(map(len, lines)))
     height = 2 * _EDGE + _LINE * len(lines)
@@ -59,7 +59,7 @@ def screen() -> str:
 
 
 def status_lines() -> list[str]:
-    """Return the lines of status of the rack as `automax run` shows them, without what the host's speed decides."""
+    """Return the rack's status lines as `automax run` shows them, without values that depend on the host's speed."""
     config = load(RACK / "rack.yaml").config
     assert config is not None
     rack = Rack(config)
@@ -73,7 +73,7 @@ def status_lines() -> list[str]:
 
 
 class _Shown:
-    """A screen that keeps what it is shown; it is always time for the next line."""
+    """A screen that stores the lines shown on it; the next line is always due."""
 
     began_ns = 0
 
@@ -90,7 +90,7 @@ class _Shown:
         raise RuntimeError(f"the example has trouble: {text}")
 
     def summary(self, summary: Summary) -> None:
-        """Keep nothing of it."""
+        """Discard the summary."""
 
 
 def _automax(*words: object) -> None:

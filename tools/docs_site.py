@@ -1,7 +1,7 @@
-"""What mkdocs calls while it builds the site: adds the written pages and those from outside of docs/, mends links.
+"""Hooks of mkdocs for building the site: add the generated pages and those from outside of docs/, and adapt links.
 
-A page may link to any file of the repository, as it does where people read it there. In the site such a link leads to
-the page that shows the file; where there is none, only its text is left.
+A page may link to any file of the repository, so that links work when it is read there. In the site such a link leads
+to the page that shows the file; where there is none, only the link's text remains.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ FROM_ELSEWHERE = {
         for path in sorted((ROOT / "config").glob("*/README.md"))
     },
 }
-"""Pages that stand outside of docs/, by their path, with their place in the site."""
+"""Pages outside of docs/, by their path, with their place in the site."""
 LINK = re.compile(r"(?<!!)\[(?P<text>[^\]]*)\]\((?P<target>[^)\s]+)\)")
 FENCE = re.compile(r"^```(?P<language>\w+)(?: (?P<file>\w+\.\w+))?[^\n`]*$", re.MULTILINE)
-"""The head of a fence: its language, and the file that it shows or what its test needs to know."""
+"""The head of a fence: its language, and the file that it shows or data for its test."""
 CODE = re.compile(r"(^```.*?^```$|`[^`\n]*`)", re.MULTILINE | re.DOTALL)
 TEXT = re.compile(r'(?P<head><div class="(?:language-text )?highlight">)(?P<text><pre>.*?</pre>)', re.DOTALL)
 TAG = re.compile(r"<[^>]*>")
 COLUMNS = 88
-"""As many letters of code are in a line of the column on a usual screen."""
+"""Characters of code in a line of the text column on a usual screen."""
 PROBLEM = re.compile(r"automax_ros/core/pages/(AMX(\d)\d+)\.md")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages that do not stand in docs/."""
+    """Add the pages that are not in docs/."""
     from mkdocs.structure.files import File
 
     for place, text in pages().items():
@@ -51,7 +51,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, *, page: Page, files: Files, **_: object) -> str:
-    """Leave of a fence its language and file, and let links lead where the site has what they name."""
+    """Reduce the head of a fence to its language and file, and point links to the places in the site."""
     place = page.file.src_uri
     source = next((path for path, there in FROM_ELSEWHERE.items() if there == place), f"docs/{place}")
     known = {file.src_uri for file in files}
@@ -61,12 +61,12 @@ def on_page_markdown(markdown: str, *, page: Page, files: Files, **_: object) ->
 
 
 def on_page_content(content: str, **_: object) -> str:
-    """Let drawings and other wide blocks of text fit into the column (docs/assets/pages.css)."""
+    """Make drawings and other wide blocks of text fit into the column (docs/assets/pages.css)."""
     return TEXT.sub(fitted, content)
 
 
 def fitted(match: re.Match[str]) -> str:
-    """Return a block of text, one that is wider than the column with the number of its columns."""
+    """Return a block of text; one wider than the column gets the number of its columns."""
     columns = max(len(line) for line in html.unescape(TAG.sub("", match["text"])).splitlines() or [""])
     head = match["head"]
     if columns > COLUMNS:
@@ -75,7 +75,7 @@ def fitted(match: re.Match[str]) -> str:
 
 
 def headed(match: re.Match[str]) -> str:
-    """Return the head of a fence as the site shows it: the name of its file as a title."""
+    """Return the head of a fence for the site, with the name of its file as a title."""
     return f"```{match['language']}" + (f' title="{match["file"]}"' if match["file"] else "")
 
 
@@ -92,7 +92,7 @@ def linked(text: str, source: str, place: str, known: set[str]) -> str:
         path = posixpath.normpath(posixpath.join(posixpath.dirname(source), target))
         there, own_anchor = site_place(path)
         if there is None or there not in known:
-            # A page that ought to be there: mkdocs reports the link.
+            # A page that should exist: mkdocs reports the link.
             return match[0] if path.startswith("docs/") or not (ROOT / path).exists() else match["text"]
         relative = posixpath.relpath(there, posixpath.dirname(place) or ".")
         return f"[{match['text']}]({relative}{own_anchor or mark + anchor})"
@@ -101,7 +101,7 @@ def linked(text: str, source: str, place: str, known: set[str]) -> str:
 
 
 def site_place(path: str) -> tuple[str | None, str]:
-    """Return where the site shows a file of the repository, None where it does not, and the anchor there or ""."""
+    """Return the place of a repository file in the site, None if it has none, and the anchor there or ""."""
     if path in FROM_ELSEWHERE:
         return FROM_ELSEWHERE[path], ""
     problem = PROBLEM.fullmatch(path)

@@ -1,6 +1,6 @@
 """Writes docs/blocks/: a page for each family of control blocks, from their declarations and examples.
 
-python tools/generate_block_pages.py, after a change in automax_ros/blocks/.
+Run python tools/generate_block_pages.py after a change in automax_ros/blocks/.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def example_of(block: Block, examples: Sequence[Example]) -> Iterator[str]:
 
 
 def text_of(value: object) -> str:
-    """Return a fixed input as the task would write it, a table by its elements."""
+    """Return a fixed input as it is written in a task, a table by its elements."""
     if isinstance(value, tuple):
         return f"({', '.join(str(item) for item in value)})"
     return str(value).upper() if isinstance(value, bool) else str(value)
@@ -107,7 +107,7 @@ def runs_on(block: Block) -> str:
 
 
 def shortened(rows: Sequence[tuple[str, ...]], items: Sequence[Input | Output]) -> list[list[str]]:
-    """Return rows of parameters, channels from the third to the last but one in one row of dots."""
+    """Return rows of parameters, with the channels from the third to the last but one as one row of dots."""
     short: list[list[str]] = []
     for row, item in zip(rows, items, strict=True):
         stem = item.name.rstrip("0123456789")
@@ -129,7 +129,7 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[s
 
 
 def main() -> None:
-    """Write the pages and remove those of families that are gone."""
+    """Write the pages and remove those of families that no longer exist."""
     TARGET.mkdir(parents=True, exist_ok=True)
     texts = pages()
     for path in TARGET.glob("*.md"):

@@ -1,7 +1,7 @@
-"""Code generation for a ROS interface package without CMake: what rosidl_generate_interfaces() runs, step by step.
+"""Code generation for a ROS interface package without CMake: the steps of rosidl_generate_interfaces().
 
 .msg -> .idl (rosidl_adapter) -> .json with type descriptions and hashes -> C structs, type supports, Python classes.
-The generators are those of the distribution, taken from PyPI; nothing is computed here.
+The generators are those of the distribution, from PyPI; nothing is computed here.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-# rclpy loads the C type support, which finds the one of its middleware by name at run time.
+# rclpy loads the C type support, which finds that of its middleware by name at run time.
 TYPE_SUPPORTS = ["rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c"]
 PYTHON_TYPE_SUPPORT = "rosidl_typesupport_c"
 # Folder and suffix of each kind of interface.
@@ -24,7 +24,7 @@ KINDS = ("msg", "srv")
 
 @dataclass(frozen=True)
 class Interfaces:
-    """One interface package: its sources, where its code goes, and the prefix that holds ROS 2."""
+    """One interface package: its sources, the folder for its code, and the prefix of ROS 2."""
 
     name: str
     folder: Path  # holds package.xml, msg/ and srv/
@@ -39,11 +39,11 @@ class Interfaces:
 
     @property
     def share(self) -> Path:
-        """What is installed as share/NAME: definitions in three forms."""
+        """The folder to be installed as share/NAME: definitions in three forms."""
         return self.output / "share"
 
     def code(self, generator: str) -> Path:
-        """The folder of one generator's files; a compiler finds headers in its parent as NAME/msg/..."""
+        """Return the folder of one generator's files; a compiler finds headers in its parent as NAME/msg/..."""
         return self.output / generator / self.name
 
 
@@ -52,16 +52,16 @@ def generate(package: Interfaces) -> None:
     _parse_once()
     _write_share(package)
     generators = [_generate_c, _generate_fastrtps, _generate_introspection, _generate_dispatch, _generate_python]
-    # Forked: each process has what is parsed already.
+    # Forked: each process has the parsed trees.
     with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
         for job in [pool.submit(_quietly, generator, package) for generator in generators]:
             job.result()
 
 
 def _parse_once() -> None:
-    """Let the generators share the trees of the .idl files: reading these takes each longer than its own work.
+    """Make the generators share the trees of the .idl files: parsing takes each longer than its own work.
 
-    To be called before a generator is imported: they take the parser's function by its name.
+    Must be called before a generator is imported, since they import the parser's function by name.
     """
     from rosidl_parser import parser
 
@@ -81,7 +81,7 @@ def _parse_once() -> None:
 
 
 def _write_share(package: Interfaces) -> None:
-    """The definitions, their .idl form, and the .json type descriptions, of which the hashes are made."""
+    """Write the definitions, their .idl form, and the .json type descriptions, from which the hashes are computed."""
     from rosidl_adapter import convert_to_idl
     from rosidl_generator_type_description import generate_type_hash
 
@@ -132,7 +132,7 @@ def _generate_python(package: Interfaces) -> None:
 
 
 def _arguments(package: Interfaces, generator: str, output: Path | None = None) -> Path:
-    """The argument file that CMake would write for a generator; returns its path."""
+    """Write the argument file that CMake would write for a generator; return its path."""
     output = output or package.code(generator)
     share = package.prefix / "share"
     templates = share / generator / "resource"
@@ -157,7 +157,7 @@ def _arguments(package: Interfaces, generator: str, output: Path | None = None) 
 
 
 def _write_visibility_header(name: str, templates: Path, output: Path) -> None:
-    """The header with a library's export macros: a template with two placeholders, filled in as CMake does."""
+    """Write the header with a library's export macros: a template with two placeholders, filled in as by CMake."""
     for template in templates.glob("*__visibility_control.h.in"):
         text = template.read_text().replace("@PROJECT_NAME_UPPER@", name.upper()).replace("@PROJECT_NAME@", name)
         (output / "msg" / template.stem).write_text(text)

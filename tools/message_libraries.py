@@ -22,17 +22,17 @@ class BuildError(Exception):
 class Library:
     """One shared library of the package."""
 
-    generator: str  # whose output is compiled
+    generator: str  # the generator whose output is compiled
     sources: tuple[str, ...]  # globs below that output
     uses: tuple[str, ...]  # the package's own libraries, by suffix
     ros: tuple[str, ...]  # ROS libraries
     extension: bool = False  # a Python extension module rather than a library
-    alone: str = ""  # what cannot be compiled together with others: its names of file scope are those of others too
+    alone: str = ""  # sources that cannot be compiled with others: their names of file scope collide
 
 
 @dataclass(frozen=True)
 class Unit:
-    """What one call of the compiler compiles: sources of one library, one after the other."""
+    """The sources of one library that one call of the compiler compiles, one after the other."""
 
     text: Path
     object: Path
@@ -74,13 +74,13 @@ LIBRARIES = {
     ),
 }
 
-# Small enough that two cores and more share the work.
+# Small enough that two or more cores share the work.
 PART_BYTES = 250_000
 COMPILERS = {".c": ("CC", "gcc", "-std=gnu11"), ".cpp": ("CXX", "g++", "-std=c++17")}
 
 
 def build_libraries(package: Interfaces) -> list[Path]:
-    """Compile everything on all cores, then link; returns the libraries and the extension.
+    """Compile everything on all cores, then link; return the libraries and the extension.
 
     Raises:
         BuildError: a compiler or Python's headers are missing, or the compiler reports an error.
@@ -95,7 +95,7 @@ def build_libraries(package: Interfaces) -> list[Path]:
 
 
 def check_tools() -> None:
-    """Raises BuildError, with the command that installs it, if a compiler or Python.h is missing."""
+    """Raise a BuildError with the command that installs it if a compiler or Python.h is missing."""
     missing = [command[0] for command in map(_compiler, COMPILERS) if shutil.which(command[0]) is None]
     if missing:
         raise BuildError(
@@ -131,14 +131,14 @@ def _include_flags(package: Interfaces) -> list[str]:
     include = package.prefix / "include"
     # ROS packages keep their headers in include/NAME/NAME, Fast CDR in include/fastcdr.
     ros = [include, *sorted(path for path in include.iterdir() if path.is_dir())]
-    # -isystem for what is not ours: no warnings from foreign headers.
+    # -isystem for headers that are not ours: they give no warnings.
     own = [f"-I{path}" for path in dict.fromkeys(generated)]
     foreign = [*ros, Path(np.get_include()), Path(sysconfig.get_path("include"))]
     return own + [f"-isystem{path}" for path in foreign]
 
 
 def _units(package: Interfaces, suffix: str, library: Library) -> list[Unit]:
-    """Divide a library's sources into what is compiled at once, so that headers are read a few times, not a hundred."""
+    """Divide a library's sources into units, so that headers are read a few times, not a hundred times."""
     folder = package.output / "objects" / suffix
     folder.mkdir(parents=True, exist_ok=True)
     sources = _sources(package, library)
@@ -176,19 +176,19 @@ def _link(package: Interfaces, suffix: str, library: Library, units: Sequence[Un
 
 
 def _run_path(library: Library) -> str:
-    """Where the loader finds the other libraries even without LD_LIBRARY_PATH, relative to the file itself."""
-    # An extension lies in lib/pythonX.Y/site-packages/NAME, the libraries in lib.
+    """Return the run path, relative to the file, for finding the other libraries without LD_LIBRARY_PATH."""
+    # An extension is in lib/pythonX.Y/site-packages/NAME, the libraries in lib.
     return "-Wl,-rpath,$ORIGIN/../../.." if library.extension else "-Wl,-rpath,$ORIGIN"
 
 
 def _search_at_link_time(prefix: Path) -> list[str]:
-    """Folders for libraries that only our dependencies need; wheels keep some under site-packages/*.libs."""
+    """Return options for libraries that only our dependencies need; wheels have some in site-packages/*.libs."""
     site_packages = Path(sysconfig.get_path("platlib"))
     return [f"-Wl,-rpath-link,{path}" for path in (prefix / "lib", *sorted(site_packages.glob("ros_*.libs")))]
 
 
 def _run(command: list[str]) -> None:
-    # The compiler is the system's own program: it must not load the wheels' libraries.
+    # The compiler is a program of the system: it must not load the wheels' libraries.
     environment = {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
     result = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     if result.returncode:

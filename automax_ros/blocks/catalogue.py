@@ -1,7 +1,4 @@
-"""The catalogue: every block by its name.
-
-The families of control blocks: what belongs together, in the order in which the documentation tells of it.
-"""
+"""The catalogue of control blocks: all blocks by name, and their families in the order of the documentation."""
 
 from __future__ import annotations
 

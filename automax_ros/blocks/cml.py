@@ -1,15 +1,13 @@
 """DC_DRIVE_CML: the current minor loop of a DC drive (section 52).
 
-The loop itself is ``drive/cml``: here stands what a CALL may say, in the order of the manual's CALL.
+Declares the parameters in the order of the manual's CALL, the limits of the inputs (table 1 and 52.1), and the rules
+over several parameters (52.1). The loop itself is in ``drive/current_loop``.
 
 The CALL latches the simple commons of its task as SCAN_LOOP does, and a scan goes from it to END (decision). KP is
 microseconds of DELTA per count of error (decision). No dynamic block stands in the task (decision).
 
-The limits of DC_DRIVE_CML's inputs (table 1 and 52.1): check compares literals, the loop what variables hold.
-
-Both ends are allowed. Where a limit follows the line's frequency it is a function of it.
-
-Rules over the parameters of DC_DRIVE_CML beyond those of each (52.1).
+Both ends of a limit are allowed; one that depends on the line's frequency is a function of it. The checker compares
+literals with the limits, the loop the values of variables.
 """
 
 from __future__ import annotations
@@ -54,19 +52,19 @@ BETWEEN_HZ = 55.0
 
 
 def limits_at(name: str, line_hz: float) -> tuple[float, float]:
-    """Return the lowest and highest value of an input at a line frequency in Hz; of REF_RATE besides 0.0."""
+    """Return the lowest and highest value of an input at a line frequency in Hz; REF_RATE may also be 0.0."""
     if name == "REF_RATE":
         return ref_rate_limits(line_hz)
     return ref_lag_limits(line_hz) if name == "REF_LAG" else LIMITS[name]
 
 
 def is_good(name: str, value: float, line_hz: float) -> bool:
-    """Return whether an input may have a value at a line frequency in Hz, as closely as a REAL variable holds it."""
+    """Return whether a value is within an input's limits at a line frequency in Hz, to the precision of a REAL."""
     return (name == "REF_RATE" and value == 0.0) or is_within(value, *limits_at(name, line_hz))
 
 
 def ref_rate_limits(line_hz: float) -> tuple[float, float]:
-    """Return the lowest and highest REF_RATE in s at a line frequency, besides 0.0, which turns the limit off.
+    """Return the lowest and highest REF_RATE in s at a line frequency, apart from 0.0, which turns the limit off.
 
     They are those of a rate of 32767 and of 1 count per scan, rounded inward as table 1 prints them: 0.00035 to 11.37 s
     at 60 Hz, 0.00042 to 13.65 s at 50 Hz (decision: to five and two decimals at any frequency).
@@ -87,7 +85,7 @@ def ioc_is_possible(ioc_thresh: int, lim_bar: int) -> bool:
 
 @dataclass(frozen=True)
 class Advised:
-    """The manual warns of a CALL without a parameter; ``without`` says what it does not have then."""
+    """A parameter without which the manual warns of a CALL; ``without`` says what the CALL then lacks."""
 
     parameter: str
     without: str
@@ -120,7 +118,7 @@ class WithinAtLine:
         return f"{self.parameter} must be {at}."
 
     def faults(self, given: Mapping[str, Given]) -> list[Fault]:
-        """Return the fault of a literal beyond its limits; none where the frequency is at fault itself."""
+        """Return the fault of a literal beyond its limits; none where the frequency itself is at fault."""
         value = given[self.parameter].value if self.parameter in given else None
         line_hz = given[self.frequency].value if self.frequency in given else self.default_hz
         if not isinstance(value, (int, float)) or not isinstance(line_hz, int):
@@ -144,7 +142,7 @@ class OvercurrentLevel:
         return f"{self.level} must be less than 1.8 x {self.largest}."
 
     def faults(self, given: Mapping[str, Given]) -> list[Fault]:
-        """Return the fault of two literals that do not go together."""
+        """Return the fault of two literals that do not fit together."""
         level, largest = (given[name].value if name in given else None for name in (self.level, self.largest))
         if not isinstance(level, int) or not isinstance(largest, int) or ioc_is_possible(level, largest):
             return []
@@ -153,7 +151,7 @@ class OvercurrentLevel:
 
 
 def _range(name: str, line_hz: float) -> str:
-    """Return the limits of an input at a line frequency as a sentence has them."""
+    """Return the limits of an input at a line frequency as part of a sentence."""
     low, high = limits_at(name, line_hz)
     zero = "0 or " if is_good(name, 0.0, line_hz) and low > 0.0 else ""
     return f"{zero}{low:g} to {high:g}"
@@ -173,7 +171,7 @@ def _input(
     form: Form = Form.ANY,
     module: str = "",
 ) -> Input:
-    """Return an input with the limits that it has."""
+    """Return an input with its limits."""
     low, high = LIMITS.get(name, (None, None))
     return Input(name, kind, name, text, required, default, form, low, high, module=module)
 

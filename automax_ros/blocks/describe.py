@@ -12,7 +12,7 @@ from automax_ros.core.types import DataType, Value
 WIDTH = 100
 """Longest line of the texts, in characters."""
 UNKNOWN_TIME = "Execution time: the manual prints none; `automax load` counts with an estimate."
-"""What stands in place of the times of a block that the manual's tables 4 to 6 do not have."""
+"""Printed instead of the times of a block that is not in the manual's tables 4 to 6."""
 _PLACE_HOLDERS = {DataType.REAL: "nnn.n", DataType.BOOLEAN: "TRUE", DataType.STRING: '"text"'}
 
 
@@ -23,7 +23,7 @@ def summary(blocks: Iterable[Block]) -> str:
 
 
 def description(block: Block) -> str:
-    """Return all there is to know about a block, ending with a template to paste."""
+    """Return the full documentation of a block, ending with a template to paste."""
     parts = [
         f"{block.name}: {block.title} (J-3676-5, section {block.section})\n",
         textwrap.fill(block.function, WIDTH, initial_indent="    ", subsequent_indent="    ") + "\n",
@@ -85,7 +85,7 @@ def _type_word(item: Input | Output) -> str:
 
 
 def input_rows(block: Block) -> list[tuple[str, ...]]:
-    """Return a row an input: name, symbol, type, need, form, meaning."""
+    """Return one row per input: name, symbol, type, need, form, meaning."""
     return [
         (item.name, _symbol(block, item), _type_word(item), _need(item), _form(item), _remarks(block, item))
         for item in block.inputs
@@ -122,7 +122,7 @@ def _remarks(block: Block, item: Input) -> str:
 
 
 def output_rows(block: Block) -> list[tuple[str, ...]]:
-    """Return a row an output: name, symbol, type, need, meaning."""
+    """Return one row per output: name, symbol, type, need, meaning."""
     return [
         (item.name, _symbol(block, item), _type_word(item), "required" if item.required else "optional", item.text)
         for item in block.outputs
@@ -130,7 +130,7 @@ def output_rows(block: Block) -> list[tuple[str, ...]]:
 
 
 def limit_rows(block: Block) -> list[tuple[str, ...]]:
-    """Return a row a limit of coefficients, and one that explains the formulas where there are any."""
+    """Return one row per limit of coefficients, and one that explains the formulas where there are any."""
     assert block.coefficients is not None
     rows: list[tuple[str, ...]]
     rows = [(limit.parameter, limit.low_text, "to", limit.high_text) for limit in block.coefficients.limits]

@@ -1,4 +1,4 @@
-"""Examples of the control blocks for the documentation: what goes in, scan by scan; what comes out is computed."""
+"""Examples of the control blocks for the documentation: inputs scan by scan; the outputs are computed."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Column = Sequence[Value]
 class Example:
     """Some scans of one block, at 4 ticks of the default tick, or at 20 of a UDC's for a block of the UDC alone.
 
-    ``fixed`` are inputs that stay, ``varied`` those that change from scan to scan, all of one length; ``fixed`` tables
-    are tuples. ``shown`` are the outputs in the table. ``every`` shows only each of that many scans. ``shift`` are the
+    ``fixed`` are constant inputs, ``varied`` those that change from scan to scan, all of one length; ``fixed`` tables
+    are tuples. ``shown`` are the outputs in the table. ``every`` shows only one in that many scans. ``shift`` are the
     inputs of the SHIFT block that runs before a READ or WRITE block in each scan.
     """
 
@@ -39,7 +39,7 @@ class Example:
 
 
 def table_of(example: Example) -> list[list[str]]:
-    """Run an example and return its table: a head of names, then one row per scan."""
+    """Run an example and return its table: a header of names, then one row per scan."""
     shift_names = [f"SHIFT: {name}" for name in example.shift]
     rows = [["scan", *shift_names, *example.varied, *example.shown]]
     instance, maker = _instances(example)
@@ -77,7 +77,7 @@ def _steps(*pairs: tuple[Value, int]) -> Column:
 
 
 def _wave(amplitude: int, scans_a_period: int, scans: int) -> Column:
-    """Return a wave whose peaks stand at whole periods from its start."""
+    """Return a wave whose peaks are at whole periods from its start."""
     angles = (2.0 * math.pi * (scan + 1) / scans_a_period for scan in range(scans))
     return tuple(round(amplitude * math.cos(angle)) for angle in angles)
 
@@ -345,4 +345,4 @@ EXAMPLES: tuple[Example, ...] = (
         every=500,
     ),
 )
-"""An example of each block that a task can call but SCAN_LOOP, in the order of the families."""
+"""An example of each block that a task can call, except SCAN_LOOP, in the order of the families."""

@@ -1,4 +1,4 @@
-"""SCAN_LOOP, and what else takes time in a scan: END and remarks (sections 4 and 53)."""
+"""SCAN_LOOP, and the execution times of END and remarks (sections 4 and 53)."""
 
 from __future__ import annotations
 

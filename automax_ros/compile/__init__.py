@@ -1,1 +1,1 @@
-"""A checked program becomes Python functions, and those become machine code."""
+"""Compiles a checked program to Python functions, and those to machine code."""

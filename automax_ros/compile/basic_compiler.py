@@ -1,14 +1,14 @@
-"""BASIC tasks as Python functions: what such a task does from one suspension to the next, a burst.
+"""Compiles BASIC tasks to Python functions that execute a burst: the statements from one suspension to the next.
 
 Two functions come from one lowering of the statements:
 
 - ``burst(state, io)``: a burst at one instant;
 - ``burst_steps(state, io)``: the same as a generator, which yields the modeled time in ns that has passed before each
-  access to what others can see, and before the burst ends.
+  access to shared data, and before the burst ends.
 
-Both begin where the ``PC`` of the state tells and return what the task waits for then: a ``Suspension`` with its
-number. All that must outlast a suspension is in the state: the PC, GOSUB's stack, limits and steps of FOR, which files
-are open. So a task that waits can be kept, loaded and executed again.
+Both begin at the ``PC`` of the state and return a ``Suspension`` with its number, for which the task then waits. All
+values that must outlast a suspension are in the state: the PC, GOSUB's stack, limits and steps of FOR, and which files
+are open. So a waiting task can be saved, loaded and executed again.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class BackgroundCompilation:
     names: tuple[str, ...] = ("burst", "burst_steps")
 
     def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> None:
-        """Take a checked BASIC task, the rack's views, and the task's own variables that a force holds."""
+        """Create the compilation of a checked BASIC task; ``held`` are its own variables that a force holds."""
         self._program, self._held = program, held
         self._views = {name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
         self._cost = cost_model
@@ -72,7 +72,7 @@ class BackgroundCompilation:
         return LineForm(cast(ScanLines, functions[name]), lines)
 
     def _function(self, name: str) -> tuple[ast.FunctionDef, frozenset[int]]:
-        """Return a function, and the lines that it yields if it does."""
+        """Return a function, and the lines that it yields, if any."""
         modeled = name == "burst_steps"
         by_lines = name == "burst_lines"
         emitter = Emitter(self._program, self._views, modeled, self._cost, by_lines=by_lines, held=self._held)
@@ -91,7 +91,7 @@ class BackgroundCompilation:
         return build.function(name, ["state", "io"], [*opening, build.finally_do(body, kept)]), frozenset(emitter.lines)
 
     def _end(self, emitter: Emitter) -> list[ast.stmt]:
-        """Return END: a subroutine is left with it; the next run begins after the START EVERY, if there is one."""
+        """Return END, which also leaves a subroutine; the next run begins after the START EVERY, if there is one."""
         emitter.body = []
         emitter.checkpoint()
         if GOSUB in self._fields:

@@ -1,4 +1,4 @@
-"""The compiler: a checked program becomes Python functions. BASIC tasks: see ``background``.
+"""The compiler from a checked program to Python functions; for BASIC tasks see ``basic_compiler``.
 
 Three functions come from one lowering of the same tree:
 
@@ -11,15 +11,15 @@ Three functions come from one lowering of the same tree:
 is dropped in the scan's buffer, so that later blocks see the forced value (decision).
 
 While the task's own variables are forced, ``CompiledTask.holding`` gives functions that drop what is written to these
-variables, a FOR's counting among it: a loop whose variable is held within its limits ends by the limit of statements,
-which faults the task (decision: on the hardware such a scan never ends either).
+variables, including the counting of a FOR: a loop whose variable is held within its limits ends by the limit of
+statements, which faults the task (decision: on the hardware such a scan never ends either).
 
 ``startup`` and ``scan_steps`` return, and ``scans`` yields, True if the task executed STOP. ``state`` is the list of
-the layout's fields: loaded into locals at the start, stored back at the end, also when a scan is broken off. ``scans``
-ends when it is closed: between scans its locals hold the state, so that a scan neither loads nor stores it. ``io`` is
-what a scan may touch: see ``ScanIo``.
+the layout's fields: loaded into locals at the start, stored back at the end, also when a scan is aborted. ``scans``
+ends when it is closed: between scans its locals hold the state, so that a scan neither loads nor stores it. ``io`` has
+all other accesses of a scan: see ``ScanIo``.
 
-``scan_steps`` and the printed source are made when they are first asked for: most runs need neither.
+``scan_steps`` and the printed source are made on first use: most runs need neither.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ ScanSteps = Callable[[StateValues, ScanIo], Generator[int, None, bool]]
 
 
 class Compilation(Protocol):
-    """Makes the functions of one task when they are asked for; ``names`` are those of its printed source."""
+    """Makes the functions of one task on demand; ``names`` are those of its printed source."""
 
     names: tuple[str, ...]
 
@@ -74,10 +74,10 @@ class Compilation(Protocol):
 
 @dataclass(frozen=True)
 class CompiledTask:
-    """A task ready to run: a control-block task scans, a BASIC task has bursts, and its ``scans`` are none.
+    """A task ready to run: a control-block task has scans, a BASIC task has bursts and no ``scans``.
 
-    ``latched`` are the commons that a scan latches, with their views, ``written`` what blocks can change; ``held`` are
-    the task's own variables that keep their values whatever the functions write.
+    ``latched`` are the commons that a scan latches, with their views, ``written`` those that blocks can change;
+    ``held`` are the task's own variables that keep their values whatever the functions write.
     """
 
     program: Program
@@ -105,7 +105,7 @@ class CompiledTask:
         return swapped
 
     def holding(self, names: frozenset[str]) -> CompiledTask:
-        """Return the same task with other variables held, by their full names: simple ones of its own, no tunables."""
+        """Return the same task with its own simple variables of these full names held; tunables cannot be."""
         return self if names == self.held else self._again(names)
 
     @cached_property
@@ -125,7 +125,7 @@ class CompiledTask:
 
     @cached_property
     def burst(self) -> Burst:
-        """What a BASIC task does from one suspension to the next, at one instant."""
+        """The burst of a BASIC task from one suspension to the next, at one instant."""
         return cast(Burst, self._compilation.functions("burst")["burst"])
 
     @cached_property
@@ -189,7 +189,7 @@ class _Compilation:
         self._globals: dict[str, object] = {"ScanTooLong": ScanTooLong}
 
     def result(self, again: Callable[[frozenset[str]], CompiledTask]) -> CompiledTask:
-        """Compile the task; ``again`` does it with other variables held."""
+        """Compile the task; ``again`` compiles it with other variables held."""
         functions = self.functions("startup", "scans")
         return CompiledTask(
             program=self._program,
@@ -209,7 +209,7 @@ class _Compilation:
         return made(self.definitions(*names), self._program.name, self._globals)
 
     def definitions(self, *names: str) -> list[ast.FunctionDef]:
-        """Lower some of the three functions; the state's fields are known when ``scans`` was among them."""
+        """Lower some of the three functions; the state's fields are known once ``scans`` is among them."""
         parts = [self._function(name) for name in names]
         return [self._wrapped(*part) for part in parts]
 
@@ -219,7 +219,7 @@ class _Compilation:
         return Form(function, dict(self._globals), self._views)
 
     def line_form(self) -> LineForm:
-        """Compile the form that yields before each line; it heeds forces."""
+        """Compile the form that yields before each line; it applies forces."""
         name = "scan_lines_forced"
         part = self._function(name)
         functions = made([self._wrapped(*part)], self._program.name, self._globals)
@@ -272,7 +272,7 @@ class _Compilation:
         return tuple(name for name in self._latched if name in outputs)
 
     def _commit(self, emitter: Emitter) -> list[ast.stmt]:
-        """Return END: what differs from the latch is written back."""
+        """Return END: values that differ from the latch are written back."""
         outer, emitter.body = emitter.body, []
         emitter.add_cost(self._cost.end_ns(self._program))
         written = self._written()
@@ -294,7 +294,7 @@ class _Compilation:
     def _wrapped(
         self, name: str, body: list[ast.stmt], emitter: Emitter, lowering: StatementLowering
     ) -> ast.FunctionDef:
-        """Return the whole function: load the state, bind what is used, the body, store the state."""
+        """Return the whole function: load the state, bind the names in use, execute the body, store the state."""
         self._globals.update(called(emitter))
         self._globals.update(emitter.extra_globals)
         opening: list[ast.stmt] = []
@@ -318,7 +318,7 @@ class _Compilation:
         return build.function(name, ["state", "io"], [*opening, *body, ast.Return(stopped)])
 
     def _start_values(self, emitter: Emitter, lowering: StatementLowering) -> list[ast.stmt]:
-        """Return what each execution begins with: an empty GOSUB stack, no statements counted, no STOP, no time."""
+        """Return the start of each execution: an empty GOSUB stack, no statements counted, no STOP, no time."""
         values = {
             "gosub_depth": (0, "gosub_depth" in self._fields),
             "steps": (0, lowering.counts_steps),

@@ -1,6 +1,6 @@
-"""Shortest and longest ways through a graph whose edges take time.
+"""Shortest and longest paths through a graph whose edges take time.
 
-Nodes are 0, 1 ...; an edge leads to a node or out of the graph, to whatever else the caller names.
+Nodes are 0, 1 ...; an edge leads to a node, or out of the graph to an exit that the caller names.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Span:
-    """The least and the most time that something takes, in ns."""
+    """The least and the most time, in ns."""
 
     least: int
     most: int
@@ -22,19 +22,19 @@ class Span:
         return Span(self.least + other.least, self.most + other.most)
 
     def joined(self, other: Span | None) -> Span:
-        """Return the bounds of either."""
+        """Return the bounds of both alternatives."""
         return self if other is None else Span(min(self.least, other.least), max(self.most, other.most))
 
 
 NOTHING = Span(0, 0)
 Edges = Sequence[Mapping[Hashable, Span]]
-"""Of each node where it leads, a whole number of a node or any other name, and the time on the way."""
+"""The targets of each node, the number of a node or an exit, with the time to each."""
 
 
 def ways_out(edges: Edges, entry: int) -> dict[Hashable, Span]:
-    """Return the least and most time from a node to each way out of the graph.
+    """Return the least and most time from a node to each exit of the graph.
 
-    On a longest way each node counts once: where edges lead in a circle, one turn counts, of all its nodes (decision).
+    On a longest path each node counts once: where edges lead in a circle, one turn counts, of all its nodes (decision).
     """
     least = _least(edges, entry)
     most = _most(edges, entry)
@@ -42,7 +42,7 @@ def ways_out(edges: Edges, entry: int) -> dict[Hashable, Span]:
 
 
 def longest_turn(edges: Edges, entry: int) -> int:
-    """Return the most time on ways from a node on that need not leave the graph, each node once."""
+    """Return the most time on paths from a node, which need not leave the graph, each node once."""
     longest = 0
     arrivals: dict[Hashable, int] = {entry: 0}
     for circle in reversed(_circles(edges, entry)):
@@ -88,7 +88,7 @@ def _most(edges: Edges, entry: int) -> dict[Hashable, int]:
 
 
 def _circles(edges: Edges, entry: int) -> list[list[int]]:
-    """Return the nodes that can be reached, those of one circle together, the last ones first (Tarjan)."""
+    """Return the reachable nodes, those of one circle together, the last ones first (Tarjan)."""
     found: list[list[int]] = []
     numbers: dict[int, int] = {entry: 0}
     low = {entry: 0}

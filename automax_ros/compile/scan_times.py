@@ -1,9 +1,9 @@
-"""The least and the most time that a scan of a task takes, over all ways through it.
+"""The least and the most time of a scan of a task, over all paths through it.
 
 Each IF may go either way, each ON any of its ways. A FOR of whole literals takes its turns exactly; of other loops, and
 of those that a jump back makes, no turn counts for the least and one for the most (decision: nothing bounds them).
-A subroutine counts wherever it is called, to the depth that a GOSUB can nest. A scan that STOP ends is none that the
-times tell of, unless there are no others (decision).
+A subroutine counts wherever it is called, to the depth that a GOSUB can nest. A scan that STOP ends does not count,
+unless there are no others (decision).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from automax_ros.language.tree.walk import jumps_of, statements_in_order
 
 @dataclass(frozen=True)
 class ScanTimes:
-    """The least and most time of a scan in ns; ``estimated`` where a time is in the sum that no manual prints."""
+    """The least and most time of a scan in ns; ``estimated`` where the sum includes a time that no manual prints."""
 
     least_ns: int
     most_ns: int
@@ -45,7 +45,7 @@ class ScanTimes:
 
 
 class _Way(enum.Enum):
-    """A way out of some statements other than to a line."""
+    """An exit from some statements that does not lead to a line."""
 
     NEXT = "to the statement after them"
     RETURN = "RETURN"
@@ -54,14 +54,14 @@ class _Way(enum.Enum):
 
 
 _Ways = dict[Hashable, Span]
-"""The ways out of some statements, lines as ``("line", number)``, each with its time."""
+"""The exits from some statements, lines as ``("line", number)``, each with its time."""
 
 
 def scan_times(program: Program, model: CostModel) -> ScanTimes:
     """Return the bounds of a scan's time, SCAN_LOOP and END included.
 
-    Of a BASIC task it is the part that START EVERY repeats, or the whole task to its END, waiting left out; of one that
-    never ends the least is 0 and the most one turn (decision).
+    For a BASIC task it is the part that START EVERY repeats, or the whole task to its END, without waiting; for one
+    that never ends the least is 0 and the most one turn (decision).
     """
     subroutines: dict[int, _Ways] = {}
     for _ in range(GOSUB_DEPTH):
@@ -86,7 +86,7 @@ def command_ns(program: Program, model: CostModel) -> int:
 
 
 def period_ns(program: Program) -> int | None:
-    """Return the time from scan to scan; of a BASIC task that of its START EVERY, None without a constant one."""
+    """Return the time from scan to scan; for a BASIC task that of its START EVERY, None without a constant one."""
     if not program.is_basic:
         return program.period_ns
     for statement in program.scan:
@@ -97,13 +97,13 @@ def period_ns(program: Program) -> int | None:
 
 
 def _first_repeated(program: Program) -> int:
-    """Return the place of the first statement of each scan; of a BASIC task that after START EVERY."""
+    """Return the place of the first statement of each scan; for a BASIC task of that after START EVERY."""
     places = (place for place, statement in enumerate(program.scan) if isinstance(statement, StartEvery))
     return next(places, -1) + 1 if program.is_basic else 0
 
 
 def _around(program: Program, model: CostModel, ended: bool) -> Span:
-    """Return the time of SCAN_LOOP, or what takes its place, and of END where the scan comes to it."""
+    """Return the time of SCAN_LOOP, or of the block in its place, and of END if the scan reaches it."""
     time = model.scan_loop_ns(program) + _loop_ns(program, model) + (model.end_ns(program) if ended else 0)
     return Span(time, time)
 
@@ -127,7 +127,7 @@ def _either(ways: _Ways, *names: _Way) -> Span | None:
 
 
 def _subroutines(program: Program, model: CostModel, inner: dict[int, _Ways]) -> dict[int, _Ways]:
-    """Return the ways out of each subroutine, where those that it calls have the ways ``inner``."""
+    """Return the exits of each subroutine, where those that it calls have the exits ``inner``."""
     called = _called(program.scan)
     if not called:
         return {}
@@ -137,7 +137,7 @@ def _subroutines(program: Program, model: CostModel, inner: dict[int, _Ways]) ->
 
 
 def _to_the_end(ways: _Ways) -> _Ways:
-    """Return the ways out of the scan's statements where the last one leads to END."""
+    """Return the exits of the scan's statements, with the last one leading to END."""
     end = _either(ways, _Way.NEXT, _Way.END)
     rest = {way: span for way, span in ways.items() if way not in (_Way.NEXT, _Way.END)}
     return rest if end is None else {**rest, _Way.END: end}
@@ -154,7 +154,7 @@ def _calls(statement: Statement) -> bool:
 
 @dataclass(frozen=True)
 class _Suite:
-    """Times of statements; ``inside`` a subroutine RETURN is a way out, else it does nothing."""
+    """Times of statements; ``inside`` a subroutine RETURN is an exit, else it does nothing."""
 
     program: Program
     model: CostModel
@@ -162,11 +162,11 @@ class _Suite:
     inside: bool
 
     def ways(self, statements: tuple[Statement, ...], first: int = 0) -> _Ways:
-        """Return the ways out of statements, from one of them on."""
+        """Return the exits of statements, from one of them on."""
         return ways_out(self.edges(statements), first)
 
     def edges(self, statements: tuple[Statement, ...]) -> list[_Ways]:
-        """Return where each statement leads, by its place, and what follows the last."""
+        """Return the targets of each statement, by its place, and of what follows the last."""
         labels = {statement.number: place for place, statement in reversed(list(enumerate(statements)))}
 
         def place_of(way: Hashable, place: int) -> Hashable:
@@ -197,7 +197,7 @@ class _Suite:
         return {way: span.plus(Span(own, own)) for way, span in inner.items()}
 
     def _branch(self, statement: If) -> _Ways:
-        """Return the ways out of THEN; a jump that is all of an IF is in the IF's time (decision)."""
+        """Return the exits of THEN; a jump that is all of an IF is in the IF's time (decision)."""
         first = statement.then[0] if len(statement.then) == 1 and not statement.otherwise else None
         return self._jump(first) if isinstance(first, Goto) else self.ways(statement.then)
 
@@ -217,7 +217,7 @@ class _Suite:
         return _joined(past, *(self._to_line(line, gosub=False) for line in jumps_of(statement)))
 
     def _to_line(self, line: int, gosub: bool) -> _Ways:
-        """Return the ways out of a jump or a GOSUB; one that nests too deep is skipped."""
+        """Return the exits of a jump or a GOSUB; one that nests too deep is skipped."""
         if not gosub:
             return {("line", line): NOTHING}
         inner = self.subroutines.get(line, {_Way.RETURN: NOTHING})
@@ -242,7 +242,7 @@ class _Suite:
         return left
 
     def _turns(self, statement: For) -> int | None:
-        """Return the turns of a loop of whole literals that nothing else than the loop counts, else None."""
+        """Return the turns of a loop of whole literals whose variable only the loop sets, else None."""
         first, last = constant_value(statement.start), constant_value(statement.stop)
         step = constant_value(statement.step or IntegerLiteral(1))
         if not all(type(value) is int for value in (first, last, step)) or step == 0:

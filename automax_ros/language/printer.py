@@ -1,9 +1,7 @@
-"""Syntax tree to text, in one canonical form that parses back to an equal tree.
+"""Prints a syntax tree as text, in one canonical form that parses back to an equal tree.
 
-Statements keep their numbers; one without a number stands on the line of the one before it. Blocks are indented, a CALL
-that is too long for its line is broken at its parameters.
-
-Expressions and simple statements as text, with no more parentheses than precedence needs.
+Statements keep their numbers; one without a number is put on the line of the one before it. Blocks are indented, a CALL
+that is too long for its line is broken at its parameters. Expressions have only the parentheses that precedence needs.
 """
 
 from __future__ import annotations
@@ -96,7 +94,7 @@ def print_expression(expression: Expression) -> str:
 def print_simple(statement: Statement) -> str:
     """Return a statement other than IF and FOR as text, without its number.
 
-    Raises ValueError for a string or a remark that the language cannot write down.
+    Raises ValueError for a string or a remark that cannot be written in the language.
     """
     if isinstance(statement, Declaration):
         return f"{statement.scope.value} {', '.join(_declared(item) for item in statement.variables)}"
@@ -304,8 +302,8 @@ _STEP = 10
 def print_module(module: Module) -> str:
     """Return the text of a task.
 
-    A tree in which no statement has a number is numbered first. Raises ValueError for a tree that no text gives, such
-    as a statement without a number after a remark.
+    A tree in which no statement has a number is numbered first. Raises ValueError for a tree that has no text, such as
+    one with a statement without a number after a remark.
     """
     if not _numbers(module.statements):
         module = numbered(module)
@@ -315,7 +313,7 @@ def print_module(module: Module) -> str:
 
 
 def numbered(module: Module) -> Module:
-    """Return the tree with a line of its own for every statement, numbered in tens (closer in long tasks).
+    """Return the tree with every statement on a separate line, numbered in tens (closer in long tasks).
 
     ELSE, END_IF and NEXT get numbers as well, as labels. Raises ValueError above 32767 statements.
     """
@@ -339,7 +337,7 @@ def _numbers(statements: tuple[Statement, ...]) -> list[int]:
 
 
 class _Numbering:
-    """Hands out line numbers in order."""
+    """Assigns line numbers in order."""
 
     def __init__(self, step: int) -> None:
         self._step = step
@@ -348,7 +346,7 @@ class _Numbering:
     def statements(
         self, statements: tuple[Statement, ...], count_only: bool = False
     ) -> tuple[tuple[Statement, ...], int]:
-        """Return the statements with numbers, and how many numbers were given out."""
+        """Return the statements with numbers, and the count of numbers assigned."""
         result: list[Statement] = []
         for statement in statements:
             if isinstance(statement, Label):
@@ -376,7 +374,7 @@ class _Numbering:
 
 
 class _Writer:
-    """Collects lines; knows what may follow on the same one."""
+    """Collects lines, with several statements on one where that is allowed."""
 
     def __init__(self) -> None:
         self._lines: list[str] = []

@@ -1,6 +1,6 @@
-"""A checked task: what the compiler, the rack and the documentation of a task need to know about it.
+"""A checked task for the compiler, the rack and the documentation of a task.
 
-Which commons a checked task can write, and where: by BASIC statements and by the outputs of blocks.
+Also finds which commons it can write, and where: by BASIC statements and by the outputs of blocks.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Symbol:
 
     @property
     def latched(self) -> bool:
-        """TRUE for what the scan latches: a simple common INTEGER, DOUBLE INTEGER or BOOLEAN (3.3)."""
+        """Whether the scan latches it: a simple common INTEGER, DOUBLE INTEGER or BOOLEAN (3.3)."""
         return self.scope is Scope.COMMON and not self.dimensions and self.type.latched
 
 
@@ -69,8 +69,9 @@ class Symbol:
 class CommonSpec:
     """A common variable as the rack defines it, for comparison with a task's COMMON statement.
 
-    ``name`` is full; ``dimensions`` are numbers of elements, () for a simple variable; ``length`` is a string's
-    maximum, 0 for other types. ``place`` is the definition for messages, such as ``rack.yaml:14``.
+    ``name`` is the full name; ``dimensions`` are numbers of elements, () for a simple variable; ``length`` is a
+    string's maximum, 0 for other types. ``place`` is the place of the definition for messages, such as
+    ``rack.yaml:14``.
     """
 
     name: str
@@ -111,12 +112,12 @@ class BoundCall:
 
     @property
     def targets(self) -> list[Expression]:
-        """What the outputs are given: variables and array elements, in the order of the declaration."""
+        """The targets of the outputs: variables and array elements, in the order of the declaration."""
         return [self.arguments[output.name] for output in self.block.outputs if output.name in self.arguments]
 
     @property
     def facts(self) -> dict[str, Value]:
-        """What the CALL fixes for the block, by lower-case name: literals, defaults, and the ``CALL_FACTS``."""
+        """Values that the CALL fixes for the block, by lower-case name: literals, defaults, and the ``CALL_FACTS``."""
         facts: dict[str, Value] = {name.lower(): value for name, value in self.defaults.items()}
         for name, given in self.arguments.items():
             if isinstance(given, (IntegerLiteral, RealLiteral, BooleanLiteral)):
@@ -130,7 +131,7 @@ class BoundCall:
 
 @dataclass(frozen=True)
 class OpenedFile:
-    """What a number after # is in a BASIC task: a port by its name, or one end of a channel with items of ``types``."""
+    """A number after # in a BASIC task: a port by its name, or one end of a channel with items of ``types``."""
 
     number: int
     port: str = ""
@@ -139,7 +140,7 @@ class OpenedFile:
 
     @property
     def words(self) -> str:
-        """What it is, for messages."""
+        """Its description, for messages."""
         if self.direction is None:
             return f"port {self.port}"
         return f"a channel FOR {self.direction.value}"
@@ -150,12 +151,13 @@ class Program:
     """A task without errors.
 
     ``startup`` are the statements before SCAN_LOOP, which run once when the task goes into RUN; ``scan`` those after
-    it up to END; neither holds declarations or SCAN_LOOP. ``calls`` maps a Call node (by identity of its span) to what
-    the checker bound it to, SCAN_LOOP included; ``data`` is the pool of DATA values, ``data_lines`` the line number of
+    it up to END; neither contains declarations or SCAN_LOOP. ``calls`` maps the span of each Call node to its binding
+    by the checker, SCAN_LOOP included; ``data`` is the pool of DATA values, ``data_lines`` the line number of
     each DATA line and the index in the pool at which it begins. ``events`` are declared by EVENT; ``event`` is the one
     that starts the scan, None where the clock does. ``scan_loop_line`` is the BASIC line of SCAN_LOOP.
 
-    A BASIC task has no SCAN_LOOP: its statements are ``scan``, ``ticks`` is 0, and ``files`` are what it opens.
+    A BASIC task has no SCAN_LOOP: its statements are ``scan``, ``ticks`` is 0, and ``files`` are the ports and channels
+    that it opens.
 
     ``cml`` is the CALL that begins the scans of a task in step with an AC line, in place of SCAN_LOOP; there ``ticks``
     is 0. It is None for other tasks.
@@ -181,12 +183,12 @@ class Program:
 
     @property
     def is_basic(self) -> bool:
-        """Whether it is a BASIC task, which waits where it wants and latches nothing."""
+        """Whether it is a BASIC task, which may wait anywhere and latches nothing."""
         return self.kind is TaskKind.BASIC
 
     @property
     def period_ns(self) -> int:
-        """The scan period: TICKS x tick rate, or the part of a line cycle that lies between two interrupts."""
+        """The scan period, ns: TICKS x tick, or the part of a line cycle between two interrupts."""
         if self.cml is None or self.cml.block.line_scan is None:
             return self.ticks * self.tick_ns
         return NS_PER_S // (self.cml.block.line_scan.per_cycle * self.line_hz)
@@ -200,11 +202,11 @@ class Program:
 
 
 Place = tuple[int, Span]
-"""The BASIC line, and where the variable stands in the text."""
+"""The BASIC line, and the place of the variable in the text."""
 
 
 def places_that_write(program: Program, scope: Scope = Scope.COMMON) -> dict[str, list[Place]]:
-    """Return where each common, or local, that the task can write is written, in the order of the text."""
+    """Return the places at which the task can write each common (or local), in the order of the text."""
     found: dict[str, list[Place]] = {}
 
     def note(target: Expression | None, line: int | None) -> None:

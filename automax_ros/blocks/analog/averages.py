@@ -23,7 +23,7 @@ def running_average_step(
 ) -> tuple[bool, int, int, int, list[int], int, int, int, int, int]:
     """Average the last samples; those not yet taken count as 0; the quotient truncates toward zero (25).
 
-    The samples stand in a ring, so that a scan costs the same for any number of them.
+    The samples are kept in a ring, so that a scan takes the same time for any number of them.
     """
     if reset:
         position = 0
@@ -108,7 +108,7 @@ def sampled_average_step(
     shown_highest: int,
     shown_lowest: int,
 ) -> tuple[bool, int, int, int, int, int, int, int, int, int, int]:
-    """Average samples until there are enough, show the result, begin again; the quotient truncates toward zero (27).
+    """Average REQUIRED_SAMPLES samples, output the result, start over; the quotient truncates toward zero (27).
 
     A REQUIRED_SAMPLES that changes meanwhile is compared with the samples taken so far, whose average is shown. Up to
     the first update the outputs are what RESET makes them (decisions).

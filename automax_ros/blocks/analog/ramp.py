@@ -20,7 +20,7 @@ def ramp_step(
 ) -> tuple[int, int, int]:
     """Move the register of OUTPUT x SCALE toward INPUT x SCALE by at most a rate (22).
 
-    In the absolute-value ramp decel leads toward zero, and a move that would cross zero stops there for that scan.
+    In the absolute-value ramp DECEL_RATE applies toward zero, and a move that would cross zero stops there for a scan.
     OUTPUT truncates toward zero. A rate of -32768 counts as 32768; RATE, the register's move, clamps to 16 bit and is 0
     while HOLD or RESET (decisions).
     """

@@ -20,13 +20,13 @@ def s_curve_step(  # noqa: PLR0912, PLR0915 - a step function calls no other
     register: int,
     speed: int,
 ) -> tuple[int, int, int, int, int]:
-    """Move the register of OUTPUT x SCALE toward INPUT x SCALE; its speed changes by at most JERK_RATE a scan (26).
+    """Move the register of OUTPUT x SCALE toward INPUT x SCALE; its speed changes by at most JERK_RATE per scan (26).
 
-    The speed is the largest that can still be taken back, JERK_RATE a scan, before INPUT is reached: k full steps of
-    the jerk take back k x JERK_RATE within JERK_RATE x k (k + 1) / 2 (decision). Accel leads up and decel down,
-    exchanged by REVERSE (decision). With JERK_RATE at least both rates the block is RAMP with ABS_RAMP = FALSE,
-    reversals included; JERK_RATE 0 keeps the speed there is (decisions). At the end of the 16-bit range OUTPUT is
-    clamped, which is logged, and the rate is set to 0 (note 5).
+    The speed is the largest that can still be reduced to 0, by JERK_RATE per scan, before INPUT is reached: k full
+    steps of the jerk reduce it by k x JERK_RATE within JERK_RATE x k (k + 1) / 2 (decision). ACCEL_RATE applies upward
+    and DECEL_RATE downward, exchanged by REVERSE (decision). With JERK_RATE at least both rates the block is RAMP with
+    ABS_RAMP = FALSE, reversals included; JERK_RATE 0 keeps the present speed (decisions). At the end of the 16-bit
+    range OUTPUT is clamped, which is logged, and the rate is set to 0 (note 5).
     """
     accel = accel_rate if accel_rate >= 0 else -accel_rate
     decel = decel_rate if decel_rate >= 0 else -decel_rate

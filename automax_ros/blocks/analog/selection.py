@@ -1,4 +1,4 @@
-"""LIMIT, MOVE, SCALE and SWITCH: what passes of a signal (sections 16, 17, 28 and 34)."""
+"""LIMIT, MOVE, SCALE and SWITCH: blocks that limit, pass, scale and select signals (sections 16, 17, 28 and 34)."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def move_step(
     input7: int,
     input8: int,
 ) -> tuple[int, int, int, int, int, int, int, int, bool]:
-    """Pass the inputs on while enabled; otherwise the output variables keep what they have, whoever wrote it (17)."""
+    """Pass the inputs on while enabled; otherwise the output variables keep their values, whatever wrote them (17)."""
     output1 = input1
     output2 = input2
     output3 = input3

@@ -1,1 +1,1 @@
-"""How a control block is declared, and what declarations share."""
+"""The declaration of a control block, and the parts that declarations share."""

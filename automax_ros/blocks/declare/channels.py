@@ -1,4 +1,4 @@
-"""Numbered parameters: INPUT1 to INPUT8 and their like."""
+"""Numbered parameters, such as INPUT1 to INPUT8."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def input_channels(
 ) -> tuple[Input, ...]:
     """Return ``count`` inputs ``stem``1, ``stem``2 ..., of which the first ``required`` must be programmed.
 
-    Name, symbol and text get the channel's number, which begins with ``first``. A channel that is not programmed has
-    the value ``unused``, which must leave the block's result as it is; None makes it optional.
+    Name, symbol and text get the channel's number, counted from ``first``. A channel that is not programmed has the
+    value ``unused``, which must not change the block's result; None makes it optional.
     """
     return tuple(
         Input(
@@ -53,7 +53,7 @@ def output_channels(
 
 
 def paired(inputs: tuple[Input, ...], others: tuple[Input, ...]) -> tuple[Input, ...]:
-    """Return the channels of two groups of inputs by turns, as the manual's statements have them."""
+    """Return the channels of two groups of inputs alternately, as in the manual's statements."""
     return tuple(item for pair in zip(inputs, others, strict=True) for item in pair)
 
 
@@ -63,6 +63,6 @@ def names(stem: str, count: int, first: int = 1) -> tuple[str, ...]:
 
 
 def programmed_channels(keywords: Iterable[str]) -> int:
-    """Return which of INPUT1, INPUT2 ... are among some keywords, as the bits 0, 1 ... of a number."""
+    """Return which of INPUT1, INPUT2 ... are among the keywords, as the bits 0, 1 ... of a number."""
     channels = (name.removeprefix("INPUT") for name in keywords if name.startswith("INPUT"))
     return sum(1 << (int(channel) - 1) for channel in channels if channel.isdigit() and channel != "0")

@@ -1,8 +1,6 @@
 """Coefficients of the dynamic blocks: mapping constant, limits, range of the integrator (sections 41 to 51).
 
-Limits of coefficients where not every parameter that they read is known.
-
-Parameters that several dynamic blocks have alike.
+Also the limits where not every parameter that they read is known, and the parameters that several dynamic blocks share.
 """
 
 from __future__ import annotations
@@ -18,7 +16,7 @@ from automax_ros.core.types import DataType
 TWO_TO_MINUS_18 = 2.0**-18
 LARGEST_HISTORY = 2.0**31
 """A filter of second order or more whose history leaves 32 bits starts again from the edge of 16 bits (decision).
-No signal comes near it, but coefficients that change all the time can make such a filter grow without end."""
+No signal comes near it, but coefficients that change continually can make such a filter grow without bound."""
 
 
 def default_wm(period_s: float) -> float:
@@ -42,7 +40,7 @@ def no_defaults(_period_s: float) -> dict[str, float]:
 
 
 def order_default(order: int) -> Callable[[float], dict[str, float]]:
-    """Return what gives the default of ORDER, for ``Coefficients.defaults``."""
+    """Return the function that gives the default of ORDER, for ``Coefficients.defaults``."""
     return lambda _period_s: {"ORDER": float(order)}
 
 
@@ -57,7 +55,7 @@ def per_period(factor: float) -> Bound:
 
 
 def by_order(factors: Mapping[int, float]) -> Bound:
-    """Return the limit factor / T, the factor by ORDER; the Limit ``uses`` ORDER."""
+    """Return the limit factor / T with the factor for ORDER; the Limit ``uses`` ORDER."""
     return lambda period_s, values: factors[int(values["ORDER"])] / period_s
 
 
@@ -84,7 +82,7 @@ def is_within(value: float, low: float, high: float) -> bool:
 def limited(declared: Coefficients, period_s: float, given: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
     """Return the parameters in force and the names of those that had to be moved to a limit.
 
-    ``given`` has the parameters that the CALL programs; the others come from the declaration's defaults.
+    ``given`` are the parameters that the CALL programs; the others come from the declaration's defaults.
     A limit that reads a parameter sees its limited value: the order of ``limits`` counts. Only a given parameter is
     limited, not a default (decision): 42.1 bounds WM by 0.01 rad/s, the default falls below it at periods over 31 s.
     """
@@ -116,12 +114,12 @@ def evaluate(block: Block, period_s: float, given: Mapping[str, float]) -> tuple
 def evaluate_noting(
     block: Block, period_s: float, given: Mapping[str, float], kept: tuple[float, ...] = ()
 ) -> tuple[tuple[float, ...], tuple[float, ...], int]:
-    """Return the coefficients, what to keep for the next evaluation, and what was out of limits as bits of a number.
+    """Return the coefficients, the parameters to keep for the next evaluation, and a number with bits for what was out.
 
     There is a bit for each limit, in their order, that a parameter had to be moved to, and one for the relation; so a
-    second parameter that goes out of its limits is noticed while the first still is. ``kept`` is what the last
-    evaluation gave to keep: the parameters of the relation, 0 as long as there was none. While a variable breaks the
-    relation, the last pair that kept it stays in force (decision).
+    second parameter that leaves its limits is noticed while the first is still beyond its own. ``kept`` are the
+    parameters that the last evaluation returned: those of the relation, 0 as long as there was none. While a variable
+    breaks the relation, the last pair that kept it stays in force (decision).
     """
     declared = block.coefficients
     if declared is None:
@@ -146,10 +144,10 @@ Ends = tuple[float, float]
 def loose_bounds(
     limit: Limit, period_s: float, values: Mapping[str, float], ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[float | None, float | None]:
-    """Return what no value of a parameter may pass, whatever those parameters are that only ``ranges`` tells of.
+    """Return the loosest limits of a parameter, for all values of the parameters that are known only by ``ranges``.
 
-    A bound that reads one of these is taken at both ends of its range, and the loosest counts; every bound goes one way
-    as a parameter rises. One that reads a parameter of which nothing is known is None.
+    A bound that reads one of these is computed at both ends of its range, and the loosest counts; every bound is
+    monotonic in a parameter. One that reads a parameter of which nothing is known is None.
     """
     open_ones = [name for name in limit.uses if name not in values and name in ranges]
     corners = [
@@ -170,7 +168,7 @@ def range_within(limit: Limit, period_s: float, values: Mapping[str, float], low
 
 
 def bound_now(bound: Bound, scan_s: float, values: Mapping[str, float]) -> float | None:
-    """Return a limit as a number, None where it needs a parameter that is not known, or has no meaning."""
+    """Return a limit as a number, None where it needs an unknown parameter or has no meaning."""
     try:
         return bound(scan_s, values)
     except (KeyError, ArithmeticError, ValueError):

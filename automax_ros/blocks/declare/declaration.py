@@ -1,22 +1,22 @@
-"""How a control block is declared: data plus one step function.
+"""The declaration of a control block: data plus one step function.
 
 Checker, compiler, documentation, templates and the cost model all read the one declaration; nothing about a block
-stands anywhere else.
+is written anywhere else.
 
 The step function is pure. Its parameters are named after the declaration, in lower case: inputs, coefficients and
 states, in any order, and only those it uses. It returns one tuple of plain names: the outputs, then the new states,
 both in the order of the declaration; then, where outputs hold, ``writes``, which says whether those are written; and
 last, where the block has ``logs``, the number of the problem (0 for none). Its body is straight assignments, ``if``,
 ``while`` and one ``return`` at the end; it uses integers, floats, booleans, comparisons, numeric constants of its
-module and the helpers of ``HELPERS``. So it can be called as it stands, inlined by the compiler from its syntax tree,
-and compiled to machine code.
+module and the helpers of ``HELPERS``. So it can be called directly, inlined by the compiler from its syntax tree, and
+compiled to machine code.
 
 Long data are buffers that a step reads by index: a table of the CALL, or a state with a ``size``, which it also writes
-in place. A step may take the ``CALL_FACTS`` besides, which are integers known when the task is compiled.
+in place. A step may also have parameters of ``CALL_FACTS``, which are integers known when the task is compiled.
 
-Three habits keep the inlined code fast. Inputs and coefficients are never assigned, so that a literal can stand in
-their place. An optional output is assigned whole (``rate = a if c else b``) and never read, so that it vanishes where
-it is not programmed. The common case takes the fewest comparisons and no call.
+Three habits keep the inlined code fast. Inputs and coefficients are never assigned, so that a literal can replace
+them. An optional output is assigned in one statement (``rate = a if c else b``) and never read, so that it vanishes
+where it is not programmed. The common case takes the fewest comparisons and no call.
 
 Booleans are ``bool``, INTEGERs ``int``, REALs and coefficients ``float``.
 """
@@ -46,7 +46,7 @@ HELPERS: dict[str, Callable[..., object]] = {
     "sign_extended": sign_extended,
     "truncated_quotient": truncated_quotient,
 }
-"""All that a step function may call."""
+"""The functions that a step function may call."""
 
 CLAMPED = 7001
 """Number that a step function returns for AMX7001: its output was clamped to 16 bits."""
@@ -61,7 +61,7 @@ NO_SUCH_COLUMN = 7005
 
 
 class Platform(enum.Enum):
-    """What kind of controller can run a block; the value is the word of ``automax check --target``."""
+    """A kind of controller that can run a block; the value is the word of ``automax check --target``."""
 
     AUTOMAX = "automax"
     PC3000 = "pc3000"
@@ -74,7 +74,7 @@ UDC_ONLY = frozenset({Platform.UDC})
 
 
 class Form(enum.Enum):
-    """How a parameter may be written."""
+    """The forms in which a parameter may be written."""
 
     ANY = "variable or literal"
     VARIABLE = "variable only"
@@ -91,7 +91,7 @@ class Special(enum.Enum):
 
     @property
     def element(self) -> DataType | None:
-        """The type that the name's type character tells, None for an event."""
+        """The type given by the name's type character, None for an event."""
         return {Special.TABLE: DataType.INTEGER, Special.WORDS: DataType.INTEGER, Special.BITS: DataType.BOOLEAN}.get(
             self
         )
@@ -104,12 +104,12 @@ ParameterType = DataType | Special
 class Input:
     """An input parameter (3.1: required, default or optional).
 
-    ``default`` None with ``required`` False makes it optional: the block does without. ``low`` and ``high`` bound a
+    ``default`` None with ``required`` False makes it optional: the block works without it. ``low`` and ``high`` bound a
     literal (both ends allowed), ``one_of`` lists the values it may have; ``symbol`` is the abbreviation in the manual's
     graphic, the name itself where the manual prints none; ``text`` says what it does. ``also`` is a second type that a
-    variable may have. ``runs_on`` names the processors whose tasks may program it. ``wants_common``: the manual wants a
-    COMMON variable there. ``sample`` stands in a template, where that is not the default. ``drive_parameter`` is the
-    parameter of the drive, as the rack file calls it, that a constant must be equal to; ``module`` the number of
+    variable may have. ``runs_on`` names the processors whose tasks may program it. ``wants_common``: the manual asks
+    for a COMMON variable. ``sample`` is its value in a template, where that is not the default. ``drive_parameter`` is
+    the parameter of the drive, as the rack file calls it, that a constant must be equal to; ``module`` the number of
     the module whose slot a literal names.
     """
 
@@ -141,8 +141,8 @@ class Output:
     """An output parameter: always a variable, never inverted.
 
     ``holds``: it is written only where the step function says so; otherwise its variable is neither read nor written.
-    With ``dimensions``, numbers of elements, it is a whole array of just these. ``alias`` is another spelling of its
-    name in the manual, which is taken with a warning.
+    With ``dimensions``, numbers of elements, it is a whole array of exactly these. ``alias`` is another spelling of its
+    name in the manual, which is accepted with a warning.
     """
 
     name: str
@@ -166,10 +166,10 @@ class State:
     """A value that a block keeps from scan to scan: ``initial`` at its first execution since RUN.
 
     INTEGER states are ints of any width the step function keeps to; REAL states and coefficients are double precision,
-    not a REAL's 24 bits (decision). A state with a
-    ``size`` is a buffer: the number of its elements comes from the facts of the CALL, by lower-case name: its literals
-    and defaults, and the ``CALL_FACTS``. A place in a buffer, or a count of places, is always 0 or more and less than
-    what ``below`` gives; a snapshot that breaks this is refused.
+    not a REAL's 24 bits (decision). A state with a ``size`` is a buffer: ``size`` gives the number of its elements from
+    the facts of the CALL by lower-case name, which are its literals and defaults, and the ``CALL_FACTS``. A place in a
+    buffer, or a count of places, is always 0 or more and less than what ``below`` gives; a snapshot that breaks this is
+    refused.
     """
 
     name: str
@@ -180,13 +180,13 @@ class State:
 
 
 CALL_FACTS = ("elements", "channels", "max_columns", "programmed")
-"""What a step function may ask of its CALL: the elements of TABLE1, channels and columns of the data structure, and
-which of the inputs INPUT1, INPUT2 ... are programmed, as the bits 0, 1 ... of a number."""
+"""Facts of its CALL that a step function may read: the elements of TABLE1, channels and columns of the data structure,
+and which of the inputs INPUT1, INPUT2 ... are programmed, as the bits 0, 1 ... of a number."""
 
 
 @dataclass(frozen=True)
 class Given:
-    """What a rule sees of a parameter that a CALL gives: a literal's ``value``, a one-dimensional array's ``size``.
+    """A parameter of a CALL as rules see it: a literal's ``value``, a one-dimensional array's ``size``.
 
     Both are None for other variables; the size also for an array whose declaration is at fault.
     """
@@ -213,7 +213,7 @@ class Rule(Protocol):
         ...
 
     def faults(self, given: Mapping[str, Given]) -> list[Fault]:
-        """Return what is wrong with the given parameters, by keyword in the order in which they stand."""
+        """Return the faults of the given parameters, which are by keyword in the order of the CALL."""
         ...
 
 
@@ -240,9 +240,9 @@ class Limit:
 class Relation:
     """A rule between parameters that are each within their limits.
 
-    Where ``holds`` is not met the last values that met it stay in force (36, 44.1). ``first(period_s, values)`` gives
-    what is in force as long as there are none. No parameter of a relation may be 0. ``ratio`` are the bounds of the
-    larger of two parameters to the smaller, where that is the rule.
+    Where ``holds`` is not met, the last values that met it stay in force (36, 44.1). ``first(period_s, values)`` gives
+    the values in force as long as there are none. No parameter of a relation may be 0. ``ratio`` are the bounds of the
+    ratio of the larger of two parameters to the smaller, where that is the rule.
     """
 
     parameters: tuple[str, ...]
@@ -254,14 +254,14 @@ class Relation:
 
 @dataclass(frozen=True)
 class Coefficients:
-    """What a dynamic block computes outside its step function, at first and again when a variable parameter changes.
+    """Values that are computed outside a dynamic block's step function, first and when a variable parameter changes.
 
-    ``parameters`` are the inputs they come from; ``names`` the values handed to the step function;
+    ``parameters`` are the inputs they come from; ``names`` the values passed to the step function;
     ``compute(period_s, values)`` returns them, from parameters already limited. A parameter that is not programmed,
     such as WM, is filled in by ``defaults(period_s)`` before. A variable one that leaves its limits counts as the
     nearest limit and logs AMX7004 on the scan in which it leaves them, not while it stays beyond (decision). A literal
     beyond them is an error of the task, unless ``limits_literals``: then it is limited and logged too. ``dynamics`` is
-    what they make of the block. ``executed_every`` names a literal that gives the time between executions in s.
+    the block's behavior with them. ``executed_every`` names a literal that gives the time between executions in s.
     """
 
     parameters: tuple[str, ...]
@@ -276,12 +276,12 @@ class Coefficients:
 
     @property
     def period_name(self) -> str:
-        """What the time between executions is called: T, the scan period, or the parameter that tells it."""
+        """The name of the time between executions: T, the scan period, or the parameter that gives it."""
         return self.executed_every or "T"
 
 
 class Access(enum.Enum):
-    """What a block does with the data structure that its STRUCTURE_NAME names."""
+    """Whether a block makes or uses the data structure that its STRUCTURE_NAME names."""
 
     MAKES = "makes"
     USES = "uses"
@@ -326,10 +326,10 @@ Step = Callable[..., tuple[Any, ...]]
 
 @dataclass(frozen=True)
 class LineScan:
-    """That interrupts in step with an AC line, not the clock, begin the scans of a block's task (52.0).
+    """The scans of a task whose block begins them by interrupts in step with an AC line, not by the clock (52.0).
 
-    ``frequency`` is the literal that tells the line's frequency in Hz, ``per_cycle`` the number of scans in a cycle,
-    ``tick_ns`` the one tick that the Processor may have.
+    ``frequency`` is the literal that gives the line's frequency in Hz, ``per_cycle`` the number of scans in a cycle,
+    ``tick_ns`` the only tick that the Processor may have.
     """
 
     frequency: str
@@ -339,16 +339,16 @@ class LineScan:
 
 @dataclass(frozen=True)
 class Block:
-    """A control block. ``function`` is its equation in one or a few lines, ``notes`` what a user must know besides.
+    """A control block. ``function`` is its equation in one or a few lines, ``notes`` what else a user must know.
 
-    ``step`` is None for a block that ``begins_scan`` alone: the task itself carries it out; ``line_scan`` says that
-    interrupts begin it. ``logs``
-    are the problems whose number the step function returns. ``structure`` says what the block does with a data
-    structure: the states of the block that makes it are the structure's, and the step functions of those that use it
-    take them too, to read, or to write a buffer in place. ``expected_on`` are Processors whose every task should call
-    the block, for the reason ``expected_since``. ``searched_to`` is the output that tells the last element searched, or
-    a negative number where all were: ``Time.m`` counts them. ``also_called`` are names that the manuals or other
-    controllers have for it, ``for_booleans`` says what does its work with BOOLEANs; both are for hints.
+    ``step`` is None for a block that only ``begins_scan``: the task itself executes it; ``line_scan`` says that
+    interrupts begin the scan. ``logs`` are the problems whose number the step function returns. ``structure`` says what
+    the block does with a data structure: the states of the block that makes it are the structure's, and the step
+    functions of those that use it have them as parameters too, to read, or to write a buffer in place. ``expected_on``
+    are Processors whose every task should call the block, for the reason ``expected_since``. ``searched_to`` is the
+    output that gives the last element searched, or a negative number where all were: ``Time.m`` counts them.
+    ``also_called`` are its names in the manuals or in other controllers, ``for_booleans`` names what does its work with
+    BOOLEANs; both are for hints.
     """
 
     name: str
@@ -386,7 +386,7 @@ class Block:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Codes of all that the block can log: ``logs``, and AMX7004 where it has coefficients."""
+        """Codes of all problems that the block can log: ``logs``, and AMX7004 where it has coefficients."""
         return self.logs if self.coefficients is None else (*self.logs, f"AMX{COEFFICIENT_LIMITED}")
 
     def parameter(self, keyword: str) -> Input | Output | None:

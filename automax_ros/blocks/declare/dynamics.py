@@ -1,9 +1,7 @@
-"""What a dynamic block is as a function of frequency (sections 36 and 41 to 51): a part of its declaration.
+"""The dynamics of a block as a function of frequency (sections 36 and 41 to 51): a part of its declaration.
 
-The step function executes it; this says what it stands for, so that tuning tools can show it, drive it and measure it
-without knowing the block.
-
-Transfer functions of the dynamic blocks: Laplace, and the discrete one that runs (sections 41 to 50).
+They describe what the step function executes, so that tuning tools can show, drive and measure a block without knowing
+it. Each block has two transfer functions: Laplace, and the discrete one that runs (sections 41 to 50).
 """
 
 from __future__ import annotations
@@ -20,11 +18,11 @@ Polynomial = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Transfer:
-    """A transfer function: as the manual prints it, and as it runs at a scan period.
+    """A transfer function as the manual prints it, and as it runs at a scan period.
 
     ``numerator`` and ``denominator`` are polynomials of s, highest power first; ``b`` and ``a`` those of the discrete
     function in z**-1, from z**0 on, a[0] = 1. ``period_s`` is the time between executions in s, ``mapping`` the C of
-    s = C (z - 1)/(z + 1) in 1/s, None where the block is not made that way (PID).
+    s = C (z - 1)/(z + 1) in 1/s, None where the block has no such mapping (PID).
     """
 
     numerator: Polynomial
@@ -36,7 +34,7 @@ class Transfer:
 
     @property
     def integrates(self) -> bool:
-        """Whether it has a pole at s = 0: a constant signal goes on moving the output."""
+        """Whether it has a pole at s = 0: a constant signal keeps the output moving."""
         return self.denominator[-1] == 0.0
 
     def laplace_response(self, rad_s: float) -> complex:
@@ -101,11 +99,12 @@ Inputs = Mapping[str, Value]
 
 @dataclass(frozen=True)
 class Integrator:
-    """The integrator inside a block: the REAL ``state`` that holds it; ``what`` it is called in a sentence.
+    """The integrator inside a block: the REAL ``state`` that holds it; ``what`` is its name in a sentence.
 
-    ``rate`` in 1/s is Kx x C, and ``formula`` is Kx as text: by Kx section 51 limits its range, in counts, which the
-    block has as its coefficient ``span``. Without a rate only LIMIT_PLUS and LIMIT_MINUS bound it. One that is
-    ``in_feedback`` follows the signal and is taken from it, so that beyond its range the rest stays in the output.
+    ``rate`` in 1/s is Kx x C, and ``formula`` is Kx as text: section 51 limits its range in counts by Kx, and the
+    block has that range as its coefficient ``span``. Without a rate only LIMIT_PLUS and LIMIT_MINUS bound it. One that
+    is ``in_feedback`` follows the signal and is subtracted from it, so that beyond its range the rest stays in the
+    output.
     """
 
     state: str
@@ -116,17 +115,17 @@ class Integrator:
 
 
 def input_carries(_inputs: Inputs) -> tuple[str, int]:
-    """Return INPUT, not inverted, as the input that carries the signal."""
+    """Return INPUT, not inverted, as the signal input."""
     return "INPUT", 1
 
 
 def no_remarks(_inputs: Inputs) -> list[str]:
-    """Return nothing to be said about a measurement."""
+    """Return no remarks about a measurement."""
     return []
 
 
 def corners_at(*names: str) -> Callable[[Parameters], Sequence[tuple[str, float]]]:
-    """Return what gives the corners of a function that bends at parameters which are frequencies."""
+    """Return the function that gives the corners of a block whose corners are parameters in rad/s."""
     return lambda values: [(name, values[name]) for name in names]
 
 
@@ -135,15 +134,14 @@ class Dynamics:
     """A block as a function of frequency.
 
     ``transfer(period_s, values)`` is its transfer function at a scan period; ``laplace`` its Laplace function with the
-    numbers put in, ``equation`` what it executes in the terms of its coefficients, and ``corners`` the names of the
-    frequencies in rad/s at which it bends, each from the parameters in force. The corners of a band
-    have no ``time_constants``. ``exact_at`` names the parameter at whose frequency the discrete function is the
-    Laplace function itself, empty where the mapping is plain bilinear; ``steps`` says how a block without a mapping
-    is made.
+    numbers put in, ``equation`` what it executes in terms of its coefficients, and ``corners`` its corner frequencies
+    in rad/s with their names, each from the parameters in force. The corners of a band have no ``time_constants``.
+    ``exact_at`` names the parameter at whose frequency the discrete function is the Laplace function itself, empty
+    where the mapping is plain bilinear; ``steps`` says how a block without a mapping is discretized.
 
     ``signals`` are the inputs that carry a signal through it; ``carrier(inputs)`` is the one to drive, and 1 or -1 for
-    its sign. It comes out at ``output``. ``stopped_by`` are inputs that, while TRUE, let nothing through, with
-    what the output does then. ``remarks(inputs)`` is what a reader of a measurement must know. ``not_measured`` says
+    its sign. ``output`` is the output of the signal. ``stopped_by`` are inputs that block the signal while TRUE, with
+    what the output does then. ``remarks(inputs)`` are remarks for the reader of a measurement. ``not_measured`` says
     why the block has no frequency response, empty where it has one.
     """
 

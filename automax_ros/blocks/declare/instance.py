@@ -1,4 +1,4 @@
-"""One block run outside a task, by its step function as it stands: whoever needs a block alone runs it here."""
+"""Runs one block outside a task by calling its step function."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from automax_ros.blocks.declare.declaration import (
 from automax_ros.core.types import DataType, Value
 
 Given = Value | Sequence[int]
-"""What an input may be given: a value, a table's elements."""
+"""The value of an input, or the elements of a table."""
 
 NS_PER_S = 1e9
 
 
 class InstanceError(ValueError):
-    """A parameter that the block does not have, needs, or may not be given in this way."""
+    """A parameter is unknown to the block, missing, or given in a form that it may not have."""
 
 
 class Instance:
@@ -34,17 +34,17 @@ class Instance:
 
     ``outputs`` and ``state`` are the values of its output variables and hidden states after the last scan, ``error`` is
     the number of the last problem that the last scan logged, 0 for none; ``coefficients`` are those it was run with.
-    ``results`` names what the step function returns: outputs, then states. ``wrote`` says whether the last scan wrote
-    outputs that hold; those it does not write stay as they are, whoever wrote into ``outputs``. A table is any sequence
-    of numbers. The name of a data structure is not given: READ and WRITE blocks get the instance of the SHIFT block
-    that makes theirs.
+    ``results`` names the values that the step function returns: outputs, then states. ``wrote`` says whether the last
+    scan wrote outputs that hold; those it does not write keep their values in ``outputs``, also values written there
+    from outside. A table is any sequence of numbers. The name of a data structure is not given: READ and WRITE blocks
+    get the instance of the SHIFT block that makes theirs.
     """
 
     def __init__(self, block: Block, period_ns: int, structure: Instance | None = None, /, **literals: Value) -> None:
-        """Take the parameters that are literals in the CALL, by lower-case keyword, and the scan period.
+        """Create the instance from the literals of the CALL, by lower-case keyword, and the scan period.
 
-        ``structure`` is the SHIFT block whose data structure a READ or WRITE block uses. A SHIFT block may be told its
-        ``channels``; without it has all eight.
+        ``structure`` is the SHIFT block whose data structure a READ or WRITE block uses. A SHIFT block may be given its
+        ``channels``; without them it has all eight.
 
         Raises:
             InstanceError: no parameter of that name, a literal outside its limits, no or the wrong structure, or
@@ -89,9 +89,9 @@ class Instance:
         return dict(self.outputs)
 
     def drive(self, name: str, signal: Iterable[Value], **inputs: Given) -> Generator[tuple[Any, ...], None, None]:
-        """Run the block once for each value of one input, the others standing still, and yield the ``results``.
+        """Run the block once for each value of one input, the others constant, and yield the ``results``.
 
-        Far faster than ``scan``; ``outputs``, ``state`` and ``error`` follow at the end.
+        Far faster than ``scan``; ``outputs``, ``state`` and ``error`` are set at the end.
 
         Raises:
             InstanceError: as for ``scan``.
@@ -116,7 +116,7 @@ class Instance:
                 self._keep(result)
 
     def _arguments(self, inputs: Mapping[str, Given]) -> list[object]:
-        """Return what the step function takes in a scan with these inputs, in its order."""
+        """Return the step function's arguments, in their order, for a scan with these inputs."""
         values = self._values(inputs)
         self.error = self._update_coefficients({**self._literals, **inputs})
         values.update(self.coefficients)

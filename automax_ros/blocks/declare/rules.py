@@ -62,7 +62,7 @@ class Contiguous:
 
 @dataclass(frozen=True)
 class NumberTrue:
-    """Of a group of boolean literals that default to FALSE, a number in bounds must be TRUE."""
+    """Of a group of boolean literals that default to FALSE, a number within bounds must be TRUE."""
 
     group: tuple[str, ...]
     low: int
@@ -74,7 +74,7 @@ class NumberTrue:
         return f"{self.low} to {self.high} of {', '.join(self.group)} must be TRUE."
 
     def faults(self, given: Mapping[str, Given]) -> list[Fault]:
-        """Return the fault of a CALL with too few or too many; one whose value is not known may be any."""
+        """Return the fault of a CALL with too few or too many; a parameter of unknown value may be either."""
         if any(name in given and given[name].value is None for name in self.group):
             return []
         found = [name for name in given if name in self.group and given[name].value is True]
@@ -174,7 +174,7 @@ class TableOfPowers:
 
 @dataclass(frozen=True)
 class MostElements:
-    """A table must not be longer than its index can tell."""
+    """A table must not be longer than its index can count."""
 
     table: str
     most: int
@@ -194,7 +194,7 @@ class MostElements:
 
 @dataclass(frozen=True)
 class Storage:
-    """Words that a literal asks for, one for each of the inputs named ``per``n, must not exceed 32767 bytes."""
+    """The words that a literal requests, for each of the inputs named ``per``n, must not exceed 32767 bytes."""
 
     literal: str
     per: str | None = None

@@ -1,6 +1,6 @@
 """READ_BITS, READ_WORDS, WRITE_BITS and WRITE_WORDS: single columns of a data structure (sections 23, 24, 39, 40).
 
-The data structure is made by a SHIFT block of the same task; ``blocks.shift`` says what it consists of.
+The data structure is made by a SHIFT block of the same task; ``blocks/discrete/shift`` describes it.
 """
 
 from __future__ import annotations

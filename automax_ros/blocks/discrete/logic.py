@@ -65,7 +65,7 @@ OR = Block(
 
 
 def latch_step(reset: bool, set: bool, clock: bool, input: bool) -> tuple[bool, bool]:
-    """Reset before set before clock; otherwise the output variable keeps what it has, whoever wrote it (15)."""
+    """Reset before set before clock; otherwise the output variable keeps its value, whatever wrote it (15)."""
     output = not reset and (set or input)
     writes = reset or set or clock
     return output, writes
@@ -93,7 +93,7 @@ LATCH = Block(
 
 
 def transition_step(input: bool, last: bool) -> tuple[bool, bool]:
-    """Set OUTPUT on the one scan on which INPUT goes on; INPUT counts as FALSE before the first scan (37, decision)."""
+    """Set OUTPUT for the scan in which INPUT becomes TRUE; before the first scan it counts as FALSE (37, decision)."""
     output = input and not last
     last = input
     return output, last

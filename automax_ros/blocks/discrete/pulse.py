@@ -1,4 +1,4 @@
-"""PULSE_MULT: counts of a pulse input, multiplied without losing any (section 21)."""
+"""PULSE_MULT: multiplies the counts of a pulse input without losing any (section 21)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def pulse_mult_step(
     was_reset: bool,
     remainder: int,
 ) -> tuple[int, int, bool, bool, int]:
-    """Multiply counts by MULTIPLIER / 32768 and carry what is left over (21).
+    """Multiply counts by MULTIPLIER / 32768 and carry the remainder (21).
 
     ``remainder`` counts in 1/32768, exactly, with its sign; counts above 32767 that the output cannot show stay in it
-    (below -32768 none can arise); it clamps at 32 bits. In relative mode the error is the low WORD_SIZE bits of
+    (none below -32768 can occur); it clamps at 32 bits. In relative mode the error is the low WORD_SIZE bits of
     INPUT - INPUT(n-1), sign extended; INPUT(n-1) is INITIAL_VALUE on the scan that RESET ends and INPUT on a first pass
     without RESET, which gives 0 (decision).
     """

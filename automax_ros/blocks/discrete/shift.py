@@ -1,9 +1,8 @@
 """SHIFT_BITS and SHIFT_WORDS: they make a data structure and shift data through it (sections 30 and 31).
 
 A data structure is a ring of columns: ``head`` is the place of column 0, a shift moves the head and not the data;
-``loaded`` counts the shifts since RESET, up to the number of columns. What lies beyond the loaded columns is left from
-before and counts as 0. A column of booleans is one number with a bit for each channel, a column of words is a row of
-numbers.
+``loaded`` counts the shifts since RESET, up to the number of columns. Columns beyond the loaded ones hold old data and
+count as 0. A column of booleans is one number with a bit for each channel, a column of words is a row of numbers.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ def shift_bits_step(
     head: int,
     loaded: int,
 ) -> tuple[bool, bool, bool, bool, bool, bool, bool, bool, bool, list[int], int, int, bool]:
-    """Shift a column in and the last one out; RESET zeroes structure and outputs, without a shift outputs keep (30)."""
+    """Shift a column in and the last one out; RESET zeroes structure and outputs; no shift, no new outputs (30)."""
     column = 0
     if reset:
         loaded = 0
@@ -191,7 +190,7 @@ def shift_words_step(
     head: int,
     loaded: int,
 ) -> tuple[bool, int, int, int, int, int, int, int, int, list[int], int, int, bool]:
-    """Shift a column in and the last one out; RESET zeroes structure and outputs, without a shift outputs keep (31)."""
+    """Shift a column in and the last one out; RESET zeroes structure and outputs; no shift, no new outputs (31)."""
     if reset:
         loaded = 0
     elif shift:

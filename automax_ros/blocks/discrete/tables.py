@@ -88,9 +88,9 @@ def search_step(
     table2: Sequence[int],
     elements: int,
 ) -> tuple[bool, int]:
-    """Find the first element that INPUT is greater than, equal to or less than, as asked; -1 without one (29).
+    """Find the first element that INPUT is greater than, equal to or less than, as requested; -1 without one (29).
 
-    Which comparison that is, is known when the task is compiled: two joined by OR are one (``>=``, ``<=``, ``!=``).
+    The comparison is known when the task is compiled: two joined by OR are one (``>=``, ``<=``, ``!=``).
     """
     index = 0
     if select:
@@ -175,7 +175,7 @@ SEARCH = Block(
         Needs("SELECT", "TABLE2"),
         Needs("TABLE2", "SELECT"),
     ),
-    # Table 5 forgets SEARCH: the UDC's time is ours, in the ratio of its other blocks to the 7010's (decision)
+    # Table 5 omits SEARCH: the UDC's time is ours, in the ratio of its other blocks to the 7010's (decision)
     times=Times(Time(19.80, m=0.68), Time(74.0, m=3.0), Time(15.84, m=0.544), Time(13.88, m=0.48)),
     notes=(
         "Two comparisons that are TRUE are joined by OR: greater than or equal to, for example.",

@@ -209,7 +209,7 @@ def lead_lag_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
 
 
 def lead_lag_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, float, float]:
-    """Return the gains of INPUT, of INPUT(n-1) and of the output before."""
+    """Return the gains of INPUT, of INPUT(n-1) and of the previous output."""
     transfer = lead_lag_transfer(period_s, values)
     return transfer.b[0], transfer.b[1], -transfer.a[1]
 

@@ -50,9 +50,9 @@ def integrate_step(
 ) -> tuple[bool, bool, int, int, float]:
     """OUTPUT = Kx (INPUT + INPUT(n-1)) + OUTPUT(n-1), the integrator itself held and limited (42.3).
 
-    A hold keeps the integrator from moving that way, then the limits act, themselves cut to the range of section 51;
+    A hold keeps the integrator from moving in its direction, then the limits act, clamped to the range of section 51;
     LIMIT_PLUS comes last and wins. While RESET is TRUE, INITIAL_VALUE is shown as it is, even beyond a
-    limit or the range, and the next free scan limits it; the history of INPUT goes on (decisions). SATURATED compares
+    limit or the range, and the next free scan limits it; the history of INPUT continues (decisions). SATURATED compares
     OUTPUT as shown, not the range of section 51 (decision).
     """
     if reset:
@@ -150,11 +150,11 @@ def prop_int_step(
     x1: int,
     integrator: float,
 ) -> tuple[bool, bool, int, int, float]:
-    """OUTPUT = INTEGRATOR + KP INPUT, where INTEGRATOR gains Kx (INPUT + INPUT(n-1)) a scan (49).
+    """OUTPUT = INTEGRATOR + KP INPUT, where INTEGRATOR gains Kx (INPUT + INPUT(n-1)) per scan (49).
 
-    Holds act on INTEGRATOR, then the limits, themselves cut to the range of section 51, LIMIT_PLUS last, so that it
-    never winds up; then the limits act on OUTPUT. A coefficient that changes leaves INTEGRATOR where it is. While RESET
-    is TRUE both are INITIAL_VALUE, even beyond a limit, and the history of INPUT goes on (decisions).
+    Holds act on INTEGRATOR, then the limits, clamped to the range of section 51, LIMIT_PLUS last, so that it never
+    winds up; then the limits act on OUTPUT. A coefficient that changes does not change INTEGRATOR. While RESET is TRUE
+    both are INITIAL_VALUE, even beyond a limit, and the history of INPUT continues (decisions).
     """
     if reset:
         integrator = float(initial_value)

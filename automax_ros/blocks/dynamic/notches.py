@@ -49,14 +49,14 @@ def notch_laplace(values: Mapping[str, float]) -> str:
 
 
 def notch_corners(values: Mapping[str, float], narrowing: float = 1.0) -> list[tuple[str, float]]:
-    """Return WN and where a notch takes 3 dB, WN (sqrt(1 + u**2) -+ u) with u = 1 / (2 Q narrowing), in rad/s."""
+    """Return WN and the frequencies of -3 dB, WN (sqrt(1 + u**2) -+ u) with u = 1 / (2 Q narrowing), in rad/s."""
     wn, u = values["WN"], 0.5 / values["Q_FACTOR"] / narrowing
     middle = math.sqrt(1.0 + u * u)
     return [("-3 dB below WN", wn * (middle - u)), ("WN", wn), ("-3 dB above WN", wn * (middle + u))]
 
 
 def notch_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, float, float]:
-    """Return the gain of INPUT - INPUT(n-2), and of the last two differences, as ``notch_step`` has them."""
+    """Return the gain of INPUT - INPUT(n-2), and of the last two differences, for ``notch_step``."""
     c = 1.0 / math.tan(values["WN"] * period_s / 2.0)
     width = c / values["Q_FACTOR"]
     scale = c * c + width + 1.0
@@ -66,9 +66,9 @@ def notch_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[fl
 def notch_step(
     input: int, reset: bool, band: float, d1: float, d2: float, x1: int, x2: int, e1: float, e2: float
 ) -> tuple[int, int, int, float, float]:
-    """INPUT plus E, the band that is taken out with its sign turned: -(s WN/Q) / (s**2 + s WN/Q + WN**2).
+    """INPUT plus E, the removed band with its sign inverted: -(s WN/Q) / (s**2 + s WN/Q + WN**2).
 
-    This is direct form I in other words: the histories of OUTPUT are those of INPUT plus E's. It takes differences of
+    This is equivalent to direct form I: the histories of OUTPUT are those of INPUT plus E's. It uses differences of
     whole counts, so that the filter settles on INPUT exactly, however low WN is. While RESET is TRUE all of INPUT's
     history is INPUT, all of OUTPUT's 0: no step follows (decision).
     """
@@ -167,7 +167,7 @@ def _notchn_equation(values: Mapping[str, float]) -> str:
 
 
 def _notchn_corners(values: Mapping[str, float]) -> list[tuple[str, float]]:
-    """Return the corners of one or of two equal stages, which take 3 dB together."""
+    """Return the corners of one stage or of two equal ones, which together attenuate by 3 dB."""
     return notch_corners(values, math.sqrt(math.sqrt(2.0) - 1.0) if values["ORDER"] == 4.0 else 1.0)
 
 
@@ -198,8 +198,8 @@ def notchn_step(
 ) -> tuple[int, int, int, int, int, float, float, float, float]:
     """Direct form I; only the output is clamped; a history beyond ``LARGEST_HISTORY`` starts again (decision).
 
-    Order 4 is D D y = N N x with polynomials N and D of second order. It is taken step by step, P = D y and Q = N x,
-    since the coefficients of D D would miss where its poles lie. While RESET is TRUE all of INPUT's history
+    Order 4 is D D y = N N x with polynomials N and D of second order. It is computed in stages, P = D y and Q = N x,
+    since the rounded coefficients of D D would misplace its poles. While RESET is TRUE all of INPUT's history
     is INPUT, all of OUTPUT's INITIAL_VALUE: no step follows (decision).
     """
     if reset:

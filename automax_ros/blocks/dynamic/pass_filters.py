@@ -60,7 +60,7 @@ def _butterworth(w: float, period_s: float, numerator: tuple[float, ...]) -> Tra
 def _coefficients(
     transfer: Callable[[float, Mapping[str, float]], Transfer], sign: float
 ) -> Callable[[float, Mapping[str, float]], tuple[float, ...]]:
-    """Return what computes the coefficients of ``pass_filter_step``: the inputs count as (1 + sign z**-1)**order."""
+    """Return a function that computes ``pass_filter_step``'s coefficients; inputs count as (1 + sign z**-1)**order."""
 
     def compute(period_s: float, values: Mapping[str, float]) -> tuple[float, ...]:
         made = transfer(period_s, values)
@@ -153,7 +153,7 @@ def _limit(frequency: str) -> Limit:
 
 
 def _dynamics(frequency: str, transfer: Callable[[float, Mapping[str, float]], Transfer], numerator: str) -> Dynamics:
-    """Return the dynamics of a filter whose Laplace function has a power of ``numerator`` above."""
+    """Return the dynamics of a filter whose Laplace function has a power of ``numerator`` as its numerator."""
 
     def laplace(values: Mapping[str, float]) -> str:
         order = int(values["ORDER"])

@@ -36,7 +36,7 @@ def pid_coefficients(_period_s: float, values: Mapping[str, float]) -> tuple[flo
 
 
 def pid_transfer(_period_s: float, values: Mapping[str, float]) -> Transfer:
-    """Return the transfer function from ERROR to OUTPUT: trapezoids and backward differences, a step a LOOP_TIME."""
+    """Return the transfer function from ERROR to OUTPUT: trapezoids, backward differences, one step per LOOP_TIME."""
     proportional, integral, derivative = _gains(values)
     _, i, d = pid_coefficients(_period_s, values)
     return Transfer(
@@ -58,7 +58,7 @@ def _laplace(values: Mapping[str, float]) -> str:
 
 
 def _corners(values: Mapping[str, float]) -> list[tuple[str, float]]:
-    """Return where the P term takes over from the I term, and the D term from it, as far as the gains are not 0."""
+    """Return where the P term exceeds the I term, and the D term the P term, as far as the gains are not 0."""
     proportional, integral, derivative = _gains(values)
     corners = []
     if integral > 0.0 and proportional > 0.0:
@@ -71,7 +71,7 @@ def _corners(values: Mapping[str, float]) -> list[tuple[str, float]]:
 
 
 def _carrier(inputs: Mapping[str, Value]) -> tuple[str, int]:
-    """Return what carries ERROR: INPUT, but FEEDBACK where the D term takes that, as this is the same for all terms."""
+    """Return the input that drives ERROR: INPUT, but FEEDBACK where the D term uses it, as it acts on all terms."""
     if inputs["DERIVATIVE"]:
         return "FEEDBACK", 1 if inputs["ACTION"] else -1
     return "INPUT", -1 if inputs["ACTION"] else 1

@@ -100,7 +100,8 @@ TACHLOSS_OVERSPEED = Block(
 
 
 SLACK = 1e-9
-"""What the rise may exceed its limit by, for the rounding of I_FDBK**2 / SCALE: exactly THRESHOLD % never trips."""
+"""Amount by which the rise may exceed its limit, for the rounding of I_FDBK**2 / SCALE: exactly THRESHOLD % never
+trips."""
 
 
 def thermal_lag(values: Mapping[str, float]) -> float:
@@ -141,7 +142,7 @@ def thermal_overload_step(
 ) -> tuple[bool, int, float, float, bool]:
     """Filter the square of the current; the rise trips above the threshold, the rounded one ends at 100 % (36.1).
 
-    The low pass moves by its distance from the input: so no rounding carries a steady current's rise beyond it.
+    The low pass moves by its distance from the input, so that rounding never carries a steady current's rise beyond it.
     """
     squared = i_fdbk * i_fdbk * scale
     y1 = 0.0 if reset else y1 + gain * (squared - y1 + (x1 - y1))

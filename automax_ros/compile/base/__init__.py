@@ -1,1 +1,1 @@
-"""What compiled code is made of: state, names, syntax trees, costs, functions that it calls."""
+"""The parts of compiled code: state, names, syntax trees, costs, functions that it calls."""

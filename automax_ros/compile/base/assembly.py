@@ -1,4 +1,4 @@
-"""What the compilations of control-block tasks and of BASIC tasks share: fields, names, and functions made of trees."""
+"""Shared by the compilations of control-block tasks and BASIC tasks: fields, names, and functions made of trees."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from automax_ros.language.program import Symbol
 
 @dataclass(frozen=True)
 class Form:
-    """One of a task's functions as a tree, its statements with their BASIC lines; what it calls, and its commons."""
+    """One of a task's functions as a tree, its statements with their BASIC lines; its callees, and its commons."""
 
     function: ast.FunctionDef
     known: Mapping[str, object]
@@ -27,7 +27,7 @@ class Form:
 
 @contextmanager
 def collections_paused() -> Iterator[None]:
-    """Collect no garbage meanwhile: a long task's tree is all alive, and to look through it takes most of the time."""
+    """Suspend garbage collection: a long task's tree is all alive, and scanning it takes most of the time."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -69,7 +69,7 @@ def local_field(symbol: Symbol) -> StateField:
 
 
 def made(definitions: list[ast.FunctionDef], name: str, known: dict[str, object]) -> dict[str, object]:
-    """Return functions of a task of this name, compiled; they see nothing but ``known``."""
+    """Return the compiled functions of a task of this name; their only globals are ``known``."""
     with collections_paused():
         code = compile(build.placed(definitions), f"<{name}>", "exec")
     found: dict[str, object] = {"__builtins__": {}, **known}
@@ -78,7 +78,7 @@ def made(definitions: list[ast.FunctionDef], name: str, known: dict[str, object]
 
 
 def stores(fields: list[str], body: list[ast.stmt]) -> list[ast.stmt]:
-    """Return the stores of the fields that a body sets: one by one, which is faster than all at once."""
+    """Return the stores of the fields that a body sets, one by one, which is faster than all at once."""
     set_there = assigned(body)
     return [
         build.set_item("state", build.constant(position), build.name(name))

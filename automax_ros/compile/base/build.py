@@ -8,11 +8,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from automax_ros.core.types import Value
 
 LOAD, STORE = ast.Load(), ast.Store()
-"""One of each for all trees: they say nothing else, and a node of its own takes as much room as any other."""
+"""One of each for all trees: they have no content, and a separate node takes as much memory as any other."""
 
 
 def nodes(*trees: ast.AST) -> Iterator[ast.AST]:
-    """Yield every expression and statement of trees, in no particular order; several times as fast as ``ast.walk``."""
+    """Yield every expression and statement of trees, in no particular order; several times faster than ``ast.walk``."""
     waiting = list(trees)
     while waiting:
         node = waiting.pop()
@@ -25,7 +25,7 @@ def nodes(*trees: ast.AST) -> Iterator[ast.AST]:
 
 
 def placed(definitions: Iterable[ast.stmt]) -> ast.Module:
-    """Return a module of functions whose nodes have the place that Python asks for: generated code has no lines."""
+    """Return a module of functions whose nodes have the positions that Python requires: generated code has no lines."""
     module = ast.Module([*definitions], [])
     for node in nodes(*module.body):
         if isinstance(node, (ast.expr, ast.stmt)):
@@ -39,7 +39,7 @@ def name(identifier: str) -> ast.Name:
 
 
 def constant(value: Value) -> ast.expr:
-    """Return a literal; negative numbers as Python itself would parse them."""
+    """Return a literal; negative numbers as Python parses them."""
     if isinstance(value, (int, float)) and not isinstance(value, bool) and value < 0:
         return ast.UnaryOp(ast.USub(), ast.Constant(-value))
     return ast.Constant(value)
@@ -117,12 +117,12 @@ _ARITHMETIC: dict[str, type[ast.operator]] = {
 
 
 def compare(left: ast.expr, operator: str, right: ast.expr) -> ast.Compare:
-    """Return a comparison; ``operator`` as BASIC writes it."""
+    """Return a comparison; ``operator`` as in BASIC."""
     return ast.Compare(left, [_COMPARE[operator]()], [right])
 
 
 def binary(left: ast.expr, operator: str, right: ast.expr) -> ast.BinOp:
-    """Return an arithmetic or bitwise operation; ``operator`` as BASIC writes it, ``//`` for floor division."""
+    """Return an arithmetic or bitwise operation; ``operator`` as in BASIC, ``//`` for floor division."""
     return ast.BinOp(left, _ARITHMETIC[operator](), right)
 
 
@@ -152,7 +152,7 @@ def choose(test: ast.expr, value: ast.expr, otherwise: ast.expr) -> ast.IfExp:
 
 
 def item(base: str, index: ast.expr) -> ast.Subscript:
-    """Return ``base[index]`` to be read."""
+    """Return ``base[index]`` as a value."""
     return ast.Subscript(name(base), index, LOAD)
 
 

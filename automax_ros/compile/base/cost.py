@@ -1,6 +1,6 @@
 """Modeled execution times of a task on a Processor (section 53).
 
-Blocks, SCAN_LOOP, END and ``!`` remarks have the manual's times; BASIC statements have none there: the table of
+Blocks, SCAN_LOOP, END and ``!`` remarks have the manual's times. It has none for BASIC statements: the table of
 estimates below is ours (decision: no source prints these times).
 """
 
@@ -19,7 +19,7 @@ from automax_ros.language.tree.tree import Remark, Statement
 
 
 class Model(enum.Enum):
-    """Whose times count; NONE: everything takes no time."""
+    """The model whose times are used; NONE: everything takes no time."""
 
     NONE = "none"
     MODEL_7010 = "57C435"
@@ -30,9 +30,9 @@ class Model(enum.Enum):
 
 
 PLATFORMS = {Model.UDC: Platform.UDC, Model.PC3000: Platform.PC3000}
-"""What other modules than AutoMax Processors are to a task: which blocks and statements they have."""
+"""The platforms of the models that are not AutoMax Processors: they determine the blocks and statements of a task."""
 MOST_SHARED_TICKS = {Model.UDC: UDC_MAX_TICKS}
-"""The most TICKS of modules whose tasks run one after the other in one scan (53.2)."""
+"""Largest TICKS of modules whose tasks run one after the other in one scan (53.2)."""
 
 STATEMENT_ESTIMATES_US = {
     "Assignment": 6.0,
@@ -63,10 +63,10 @@ STATEMENT_ESTIMATES_US = {
 }
 """Estimated microseconds on a 7010 by kind of BASIC statement, Next for each turn; others take none (decision).
 
-MinorLoop is a scan of DC_DRIVE_CML, the latch of the commons left out: no manual prints its time.
+MinorLoop is a scan of DC_DRIVE_CML without the latch of the commons: no manual prints its time.
 """
 SLOWER_THAN_7010 = {Model.MODEL_6010: 4.0, Model.MODEL_6011: 4.0, Model.UDC: 0.8, Model.PC3000: 0.7}
-"""How many times the 7010's estimate a BASIC statement takes on each module (decision: the ratios of tables 4 to 6)."""
+"""Time of a BASIC statement on each module over the 7010's estimate (decision: the ratios of tables 4 to 6)."""
 
 
 @dataclass(frozen=True)
@@ -77,17 +77,17 @@ class CostModel:
     alone: bool = False
 
     def block_ns(self, bound: BoundCall) -> int:
-        """Return the time of one block as it is programmed, without that of the elements that it searches."""
+        """Return the time of one block as programmed, without that of the elements that it searches."""
         time = self._time(bound.block.times)
         return 0 if time is None else _to_ns(_sum(time, _programmed(bound)))
 
     def element_ns(self, bound: BoundCall) -> int:
-        """Return the time of each element that a block searches: how many those are, a scan tells (m of the tables)."""
+        """Return the time of each element that a block searches; a scan determines their number (m of the tables)."""
         time = self._time(bound.block.times)
         return 0 if time is None else _to_ns(time.m)
 
     def block_bounds_ns(self, bound: BoundCall) -> tuple[int, int]:
-        """Return the least and the most time of one block: of what it searches, one element or all."""
+        """Return the least and the most time of one block, with one searched element and with all."""
         programmed, each = self.block_ns(bound), self.element_ns(bound)
         return programmed + each, programmed + each * max(1, bound.elements)
 
@@ -96,7 +96,7 @@ class CostModel:
         return self.model is not Model.NONE and type(statement).__name__ in STATEMENT_ESTIMATES_US
 
     def scan_loop_ns(self, program: Program) -> int:
-        """Return the time of SCAN_LOOP, or what takes its place, with its latch."""
+        """Return the time of SCAN_LOOP, or of the block in its place, with its latch."""
         return self._scan_part(SCAN_LOOP.times, program)
 
     @property
@@ -105,11 +105,11 @@ class CostModel:
         return self._estimate_ns("MinorLoop")
 
     def end_ns(self, program: Program) -> int:
-        """Return the time of END, the write-back included."""
+        """Return the time of END, including the write-back."""
         return self._scan_part(END_TIMES, program)
 
     def statement_ns(self, statement: Statement) -> int:
-        """Return the estimated time of a BASIC statement without what stands inside it."""
+        """Return the estimated time of a BASIC statement without the statements inside it."""
         if isinstance(statement, Remark):
             time = self._time(REMARK_TIMES) if statement.costs else None
             return 0 if time is None else _to_ns(time.base)
@@ -146,9 +146,9 @@ def _to_ns(microseconds: float) -> int:
 
 
 def _programmed(bound: BoundCall) -> dict[str, int]:
-    """Return the numbers of what is programmed, by the letters of the manual's tables.
+    """Return the counts of programmed parameters, by the letters of the manual's tables.
 
-    Inputs of numbered channels alone are ``j``: SELECT's are INPUTn and SELECTn, those of WRITE blocks are without
+    Only inputs of numbered channels count as ``j``: SELECT's are INPUTn and SELECTn, those of WRITE blocks are without
     STRUCTURE_NAME, COLUMN and ENABLE; ERROR of READ blocks is an output among ``n`` (decision).
     """
     block = bound.block

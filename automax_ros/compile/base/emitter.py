@@ -1,7 +1,7 @@
-"""The place where generated statements go: suites, temporaries, memory accesses, costs, logging.
+"""Collects the generated statements of a function: suites, temporaries, memory accesses, costs, logging.
 
-One emitter makes one function. Whatever has an effect or can fail is hoisted, in the order of the source, into
-statements before the statement that uses it; so expressions are pure and both forms of a scan come from one lowering.
+One emitter makes one function. Operations with an effect, or that can fail, are hoisted in the order of the source into
+statements before the statement that uses them; so expressions are pure and both forms of a scan come from one lowering.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from automax_ros.language.tree.tree import Scope
 OVER = "over"
 """The local that holds the number of a statement's first overflow."""
 DROPPED = "dropped"
-"""The local that takes what is written to a held variable; nothing reads it."""
+"""The local that receives values written to a held variable; nothing reads it."""
 
 
 @dataclass
@@ -30,7 +30,7 @@ class Emitter:
     ``modeled`` makes the generator form, which yields the modeled cost in ns before each access to actual memory.
     ``views`` maps the full names of commons to their views. ``in_block`` is set inside a block statement, subscripts
     included: there a latched common is the value of the latch. ``forces`` are the latched commons that may be forced.
-    ``held`` are the task's own simple variables that a force holds: what is written to them is dropped.
+    ``held`` are the task's own simple variables that a force holds: values written to them are dropped.
     """
 
     program: Program
@@ -52,14 +52,14 @@ class Emitter:
     _overflows: bool = False
 
     def emit(self, *statements: ast.stmt) -> None:
-        """Append statements to the current suite, as those of the present BASIC line."""
+        """Append statements to the current suite, as part of the current BASIC line."""
         for statement in statements:
             statement.lineno = self.line
         self.body.extend(statements)
 
     @contextmanager
     def suite(self) -> Iterator[list[ast.stmt]]:
-        """Collect what is emitted inside into a suite of its own; its cost is booked inside it."""
+        """Collect statements emitted inside into a separate suite, in which their cost is booked."""
         outer, self.body = self.body, []
         try:
             yield self.body
@@ -69,7 +69,7 @@ class Emitter:
 
     @contextmanager
     def statement(self, line: int) -> Iterator[None]:
-        """Frame one BASIC statement: temporaries start again, its first overflow is logged at its end."""
+        """Frame one BASIC statement: temporaries restart, and its first overflow is logged at its end."""
         self.line, self._temporaries, self._overflows = line, 0, False
         target, position = self.body, len(self.body)
         yield
@@ -84,7 +84,7 @@ class Emitter:
         return f"t{self._temporaries}"
 
     def keep(self, value: ast.expr, changing: frozenset[str] = frozenset()) -> ast.expr:
-        """Return an expression that may be written twice: the value itself, or a temporary that holds it.
+        """Return an expression that may be used twice: the value itself, or a temporary that holds it.
 
         ``changing`` are Python names that get another value before the expression is used.
         """
@@ -133,7 +133,7 @@ class Emitter:
         return self.program.symbols[name]
 
     def read(self, name: str, element: ast.expr | None = None) -> ast.expr:
-        """Return a variable's present value; a common is read from actual memory, by a block from the latch (3.3)."""
+        """Return a variable's present value; a common is read from actual memory, in a block from the latch (3.3)."""
         symbol = self.symbol(name)
         if symbol.scope is Scope.LOCAL:
             return build.name(variable_name(name)) if element is None else build.item(variable_name(name), element)
@@ -148,14 +148,14 @@ class Emitter:
         return build.name(result)
 
     def element_reader(self, name: str) -> Callable[[ast.expr], ast.expr]:
-        """Return what makes the expression that reads an array's element of a flat index, which must be in range."""
+        """Return a function that makes the read of an array's element from its flat index, which must be in range."""
         if self.symbol(name).scope is Scope.LOCAL:
             return lambda index: build.item(variable_name(name), index)
         view = build.constant(self.views[name])
         return lambda index: build.call(self.member("read_now"), view, index)
 
     def write(self, name: str, value: ast.expr, element: ast.expr | None = None) -> None:
-        """Emit the store of a value, already within the type, into a variable for a BASIC statement."""
+        """Emit a BASIC statement's store of a value, already within the type, into a variable."""
         symbol = self.symbol(name)
         if symbol.scope is Scope.LOCAL:
             if element is None:
@@ -171,13 +171,13 @@ class Emitter:
         self.emit(build.do(build.call(self.member("write_now"), *arguments)))
 
     def mark_line(self, line: int | None) -> None:
-        """Emit the yield of a BASIC line that begins; ``shown`` gets its names when all of them are known."""
+        """Emit the yield at the beginning of a BASIC line; ``shown`` gets its names when all of them are known."""
         if self.by_lines and line is not None:
             self.lines.add(line)
             self.emit(build.do(ast.Yield(ast.Tuple([build.constant(line), self.shown], build.LOAD))))
 
     def add_cost(self, nanoseconds: int) -> None:
-        """Add modeled execution time to what is not yet booked."""
+        """Add modeled execution time to the pending cost."""
         if self.modeled:
             self.pending_ns += nanoseconds
 

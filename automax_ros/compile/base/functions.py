@@ -1,4 +1,4 @@
-"""What compiled BASIC statements call: the built-in functions and the operations that can fail.
+"""The functions that compiled BASIC statements call: built-in functions and operations that can fail.
 
 A function that can fail returns its result and the number of the problem, 0 for none; the others return the result.
 Nothing here raises, whatever the arguments.
@@ -84,7 +84,7 @@ def real_power(base: float, exponent: float) -> Fallible:
 
 
 def whole(value: float) -> int:
-    """Return a REAL without its fraction; what is not a number is 0, an infinite one lies beyond 32 bits."""
+    """Return a REAL without its fraction; NaN gives 0, an infinite one a value beyond 32 bits."""
     if math.isnan(value):
         return 0
     if value >= 1e18:
@@ -93,7 +93,7 @@ def whole(value: float) -> int:
 
 
 def store_real(value: float) -> tuple[float, bool]:
-    """Return what a REAL variable takes, and whether it was clamped."""
+    """Return the value that a REAL variable stores, and whether it was clamped."""
     return stored_real(value)
 
 
@@ -154,7 +154,7 @@ def character(code: float) -> tuple[str, int]:
 
 
 def real_text(value: float) -> str:
-    """Return a REAL as PRINT and STR$ show it: eight significant digits, no needless zeros."""
+    """Return a REAL as text for PRINT and STR$: eight significant digits, no unnecessary zeros."""
     text = f"{value + 0.0:.8G}"
     if "E" in text:
         mantissa, _, exponent = text.partition("E")
@@ -172,7 +172,7 @@ def text_of(value: object) -> str:
 
 
 def number_of(text: str) -> Fallible:
-    """VAL: the number that a text holds; 0 and a problem where it holds none."""
+    """VAL: the number in a text; 0 and a problem where there is none."""
     stripped = text.strip()
     if not stripped or set(stripped) - set("0123456789+-.Ee"):
         return 0.0, BAD_ARGUMENT
@@ -224,12 +224,12 @@ def bit_test(value: int, bit: int) -> tuple[bool, int]:
 
 
 def shift_left(value: int, count: int) -> tuple[int, int]:
-    """SHIFTL%: the low 16 bits of the value shifted left by 0 to 15 places, zeros come in."""
+    """SHIFTL%: the low 16 bits of the value shifted left by 0 to 15 places, filled with zeros."""
     return (sign_extended(value << count, WORD), 0) if 0 <= count < WORD else (value, BAD_ARGUMENT)
 
 
 def shift_right(value: int, count: int) -> tuple[int, int]:
-    """SHIFTR%: the low 16 bits of the value shifted right by 0 to 15 places, zeros come in."""
+    """SHIFTR%: the low 16 bits of the value shifted right by 0 to 15 places, filled with zeros."""
     return (sign_extended((value & 0xFFFF) >> count, WORD), 0) if 0 <= count < WORD else (value, BAD_ARGUMENT)
 
 
@@ -247,7 +247,7 @@ def rotate_right(value: int, count: int) -> tuple[int, int]:
 
 
 def data_value(value: Value, suffix: str, limit: int) -> tuple[Value, int]:
-    """Return a DATA value as READ stores it in a variable of a type character, with the problem, 0 for none.
+    """Return a DATA value converted by READ for a variable of a type character, and the problem, 0 for none.
 
     ``limit`` is the length of a string variable.
     """
@@ -268,7 +268,7 @@ def data_value(value: Value, suffix: str, limit: int) -> tuple[Value, int]:
 
 @dataclass(frozen=True)
 class Builtin:
-    """How a BASIC function is carried out: ``fallible`` ones return a problem with the result.
+    """The implementation of a BASIC function: ``fallible`` ones return a problem with the result.
 
     ``low`` and ``high`` bound an integer result.
     """
@@ -304,10 +304,10 @@ BUILTINS: dict[str, Builtin] = {
     "ROTATEL%": Builtin(rotate_left, True),
     "ROTATER%": Builtin(rotate_right, True),
 }
-"""The functions that are plain calls; ABS, INT, MIN, MAX and those of the task stand in the compiler."""
+"""The functions that are plain calls; ABS, INT, MIN, MAX and those of the task are in the compiler."""
 
 OPERATIONS: dict[str, Callable[..., object]] = {
     function.__name__: function
     for function in (integer_quotient, real_quotient, integer_power, real_power, whole, store_real, joined, data_value)
 }
-"""The operations of expressions that generated code calls, by the name it calls them."""
+"""The operations of expressions that generated code calls, by name."""

@@ -1,6 +1,6 @@
-"""The typed layout of a task's state: what a task keeps from scan to scan, by name.
+"""The typed layout of a task's state, which the task keeps from scan to scan: its fields by name.
 
-Snapshots, monitoring, forcing of locals, hot reload and replay know a task's state only through its layout and the
+Snapshots, monitoring, forcing of locals, hot reload and replay access a task's state only through its layout and the
 layout's hash.
 """
 
@@ -19,7 +19,7 @@ StateValue = Value | list[Value]
 
 
 class Role(enum.Enum):
-    """What a field of the state is."""
+    """Role of a field of the state."""
 
     LOCAL = "local"
     TUNABLE = "tunable"
@@ -41,8 +41,8 @@ class StateField:
     """One field: ``name`` is the variable's full name, or line, block and state as in ``1030 LAG.y1``.
 
     ``initial`` is the value at installation (locals), or at the block's first execution since RUN; ``dimensions`` are
-    an array's, ``length`` is the longest text of a string. ``below``, where it is not 0, tells that the value is 0 or
-    more and less than it: a place in a buffer.
+    an array's, ``length`` is the longest text of a string. A ``below`` that is not 0 means that the value is 0 or more
+    and less than it: a place in a buffer.
     """
 
     name: str
@@ -60,7 +60,7 @@ class StateField:
         return [self.initial] * self.size if self.is_array else self.initial
 
     def typed(self, value: Value) -> Value:
-        """Return a value from a snapshot in the field's own type.
+        """Return a value from a snapshot in the field's type.
 
         Raises:
             ValueError: the field cannot hold it.
@@ -87,7 +87,7 @@ class Layout:
 
     @property
     def hash(self) -> str:
-        """SHA-256 over names, types, sizes and roles."""
+        """SHA-256 of names, types, sizes and roles."""
         text = "\n".join(
             f"{field.name}:{field.type.word}:{field.dimensions or field.size}:{field.length}:{field.role.value}"
             for field in self.fields
@@ -110,13 +110,13 @@ class Layout:
         return [field.fresh() for field in self.fields]
 
     def restart(self, state: list[StateValue]) -> None:
-        """Put a state where RUN puts it: blocks and stacks start again, locals and tunables keep (2.4.5)."""
+        """Reset a state as RUN does: blocks and stacks start again, locals and tunables keep their values (2.4.5)."""
         for position, field in enumerate(self.fields):
             if field.role in (Role.BLOCK, Role.STACK):
                 state[position] = field.fresh()
 
     def lose_locals(self, state: list[StateValue], kept: Container[str] = ()) -> None:
-        """Set the locals of a state but those ``kept``, and not its tunables, to their values at installation."""
+        """Set the locals of a state, except those ``kept`` and tunables, to their values at installation."""
         for position, field in enumerate(self.fields):
             if field.role is Role.LOCAL and field.name not in kept:
                 state[position] = field.fresh()
@@ -132,7 +132,7 @@ class Layout:
         return values
 
     def restore(self, values: Sequence[Value]) -> list[StateValue]:
-        """Return the state from flat values, each brought back to its field's type.
+        """Return the state from flat values, each converted to its field's type.
 
         Raises:
             ValueError: the number of values is not the layout's, or a field cannot hold its value.

@@ -1,6 +1,6 @@
-"""Names in generated code: readable, and never those of anything else.
+"""Names in generated code: readable and without collisions.
 
-A BASIC variable is its name with the letter of its type; the names of generated helpers are in lower case.
+A BASIC variable gets its name with the letter of its type; the names of generated helpers are in lower case.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ def variable_name(full_name: str) -> str:
 
 
 def latched_name(full_name: str) -> str:
-    """Return the Python name of the value that was latched, which END compares with."""
+    """Return the Python name of a latched value, with which END compares."""
     return f"latched_{variable_name(full_name)}"
 
 
 def forced_name(full_name: str) -> str:
-    """Return the Python name of the flag that a force holds a variable."""
+    """Return the Python name of the flag that says whether a force holds a variable."""
     return f"forced_{variable_name(full_name)}"
 
 
 def block_prefix(line: int, occurrence: int) -> str:
-    """Return what begins the names of a block's locals; ``occurrence`` counts the calls of one line from 0."""
+    """Return the prefix of the names of a block's locals; ``occurrence`` counts the calls of one line from 0."""
     return f"b{line}_" if occurrence == 0 else f"b{line}_{occurrence + 1}_"
 
 
 def structure_prefix(full_name: str) -> str:
-    """Return what begins the names of a data structure's states: ``QUEUE%`` gives ``QUEUE_i_``."""
+    """Return the prefix of the names of a data structure's states: ``QUEUE%`` gives ``QUEUE_i_``."""
     return f"{variable_name(full_name)}_"

@@ -1,4 +1,4 @@
-"""What compiled tasks and those who run them agree on: the state, what a task may touch, how it can end."""
+"""The interface between compiled tasks and their callers: the state, the accesses of a task, its ways to end."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ StateValues = list[StateValue]
 
 
 class ScanTooLong(Exception):
-    """A scan executed more statements than a scan may; ``line`` is the BASIC line it was at."""
+    """A scan executed more statements than allowed; ``line`` is the BASIC line that it had reached."""
 
     def __init__(self, line: int) -> None:
-        """Take the BASIC line number."""
+        """Create the exception from the BASIC line number."""
         super().__init__(f"more statements than a scan may execute, at line {line}")
         self.line = line
 
 
 class ScanIo(Protocol):
-    """What a compiled scan touches apart from its own state."""
+    """The accesses of a compiled scan apart from its own state."""
 
     def latch(self) -> Latched:
         """Return the latched commons in the order of ``CompiledTask.latched``."""
         ...
 
     def forces(self) -> tuple[bool, ...]:
-        """Return which of ``CompiledTask.written`` a force holds."""
+        """Return for each of ``CompiledTask.written`` whether a force holds it."""
         ...
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
-        """Write back what blocks changed: pairs of view and value; called only if something changed."""
+        """Write back the changes of blocks as pairs of view and value; called only if there are any."""
         ...
 
     def read_now(self, view: int, element: int = 0) -> Value:
@@ -54,7 +54,7 @@ class ScanIo(Protocol):
         ...
 
     def errors_logged(self) -> bool:
-        """Return whether the error log holds an entry."""
+        """Return whether the error log has an entry."""
         ...
 
     def clear_errors(self) -> None:
@@ -77,21 +77,21 @@ class ScanIo(Protocol):
         """Execute a scan of the drive's current minor loop.
 
         ``inputs`` are in the order of the block's declaration, None for one that has no default and is not programmed;
-        ``records`` is a local DIAG_DATA, which the loop writes. Returns the outputs but DIAG_DATA in the order of the
-        declaration, or None where none is written.
+        ``records`` is a local DIAG_DATA, which the loop writes. Returns the outputs except DIAG_DATA in the order of
+        the declaration, or None where none is written.
         """
         ...
 
 
 class Suspension(enum.IntEnum):
-    """Why a BASIC task gives the Processor up, and what the number after it says."""
+    """Why a BASIC task gives up the Processor, and the meaning of the number after it."""
 
     END = 0
-    """END: it goes on when its START EVERY says so, or with 0 after it its run is over."""
+    """END: it continues at its next START EVERY; with 0 after it its run has ended."""
     STOP = 1
-    """STOP: its run is over."""
+    """STOP: its run has ended."""
     DELAY = 2
-    """It goes on after this many ns."""
+    """It continues after this many ns."""
     EVENT = 3
     """It waits for the event of this index in ``Program.events``."""
     EMPTY = 4
@@ -103,21 +103,21 @@ class Suspension(enum.IntEnum):
     PORT = 7
     """It waits for a character of a port, for ever."""
     BUSY = 8
-    """It has executed as many statements as it may before others get their turn."""
+    """It has executed the most statements allowed before others get their turn."""
 
 
 Wish = tuple[int, int]
-"""A ``Suspension`` and its number: what a BASIC task waits for."""
+"""A ``Suspension`` and its number, for which a BASIC task waits."""
 
 MUST_WAIT = -1
-"""What an access to a channel returns in place of a problem where the task must wait."""
+"""Returned by an access to a channel in place of a problem where the task must wait."""
 
 
 class BackgroundIo(ScanIo, Protocol):
-    """What a BASIC task touches besides."""
+    """The additional accesses of a BASIC task."""
 
     def start_every(self, period_ns: int) -> None:
-        """Register that the task goes on each period from now."""
+        """Start a period after each of which the task continues, from now on."""
         ...
 
     def open_reader(self, number: int, types: str, depth: int) -> int:
@@ -125,26 +125,26 @@ class BackgroundIo(ScanIo, Protocol):
         ...
 
     def open_writer(self, number: int, types: str) -> int:
-        """Find a channel to write to; return the problem, 0, or MUST_WAIT while nobody reads it."""
+        """Open a channel for writing; return the problem, 0, or MUST_WAIT while it has no reader."""
         ...
 
     def receive(self, number: int) -> tuple[tuple[Value, ...], int]:
-        """Take the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
+        """Remove the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
         ...
 
     def send(self, number: int, message: tuple[Value, ...]) -> int:
-        """Put a message into a channel; return 0, the problem, or MUST_WAIT where it is full."""
+        """Append a message to a channel; return 0, the problem, or MUST_WAIT where it is full."""
         ...
 
 
 LineValues = tuple[int, tuple[StateValue, ...]]
-"""A BASIC line that is about to be executed, and the values by then: the state's fields, then the latched commons."""
+"""A BASIC line to be executed next, and the values before it: the state's fields, then the latched commons."""
 ScanLines = Callable[[StateValues, Any], Generator[LineValues, None, bool]]
 
 
 @dataclass(frozen=True)
 class LineForm:
-    """A scan or a burst as a generator that yields before each BASIC line; ``lines`` are all that it can yield."""
+    """A scan or a burst as a generator that yields before each BASIC line; ``lines`` are those that it can yield."""
 
     scan: ScanLines
     lines: frozenset[int]

@@ -1,1 +1,1 @@
-"""How the step function of a block becomes part of a scan: folded, inlined, its coefficients computed."""
+"""Makes the step function of a block part of a scan: folded, inlined, its coefficients computed."""

@@ -1,10 +1,9 @@
-"""The coefficients of a dynamic block as a function of straight Python: what ``evaluate_noting`` does, for one block.
+"""The function that computes a block's coefficients while its task runs, and its quick form once it is called often.
 
-The limits come first, each with the values that those before it left, then the relation between parameters, then the
-coefficients themselves. The formulas are the block's own, traced; only the order of these steps is written again here,
-and every test of identity holds it against ``blocks.coefficients``.
-
-The function that computes a block's coefficients while its task runs, and its quick form once it is called often.
+The quick form is straight Python that does for one block what ``evaluate_noting`` does: the limits come first, each
+with the values that those before it left, then the relation between parameters, then the coefficients. The formulas are
+the block's own, traced; only the order of these steps is repeated here, and every test of identity compares it with
+``blocks/declare/coefficients``.
 """
 
 from __future__ import annotations
@@ -31,10 +30,10 @@ Computed = Callable[..., tuple[float, ...]]
 
 @dataclass(eq=False)
 class CoefficientFunction:
-    """Computes a block's coefficients from evaluated parameters and what was kept of the last time.
+    """Computes a block's coefficients from evaluated parameters and the values kept from the last call.
 
-    It returns the coefficients, what to keep, and what is limited as bits of a number. ``quickened`` gives a function
-    that returns the same, bit for bit, in less time; None where there is none.
+    It returns the coefficients, the values to keep, and the limited parameters as bits of a number. ``quickened`` gives
+    a function that returns the same, bit for bit, in less time; None where there is none.
     """
 
     block: Block
@@ -46,7 +45,7 @@ class CoefficientFunction:
     _quick: Computed | None = None
 
     def __call__(self, *values: float) -> tuple[float, ...]:
-        """Return coefficients, what to keep, bits."""
+        """Return the coefficients, the values to keep, and the bits."""
         if self._quick is not None:
             return self._quick(*values)
         self._calls += 1
@@ -55,7 +54,7 @@ class CoefficientFunction:
         return self.evaluate(*values)
 
     def evaluate(self, *values: float) -> tuple[float, ...]:
-        """Return the same by the block's own formulas, called as they stand."""
+        """Return the same by calling the block's own formulas."""
         given = {**self.literals, **dict(zip(self.evaluated, values, strict=False))}
         results, keep, limited = evaluate_noting(self.block, self.period_s, given, values[len(self.evaluated) :])
         return (*results, *keep, limited)
@@ -67,11 +66,11 @@ def kept_names(declared: Coefficients) -> list[str]:
 
 
 _Known = dict[str, object]
-"""For each parameter a number, or the name that holds it."""
+"""The number of each parameter, or the name that holds it."""
 
 
 def coefficient_tree(function: CoefficientFunction) -> ast.FunctionDef:
-    """Return a function that gives what ``function`` gives, for arguments that are all REALs.
+    """Return a function as a tree that returns the same as ``function``, for arguments that are all REALs.
 
     Raises:
         NotNative: the block's formulas cannot be traced.
@@ -82,7 +81,7 @@ def coefficient_tree(function: CoefficientFunction) -> ast.FunctionDef:
 
 
 def quick_form(function: CoefficientFunction) -> Computed | None:
-    """Return the traced function as Python, a dozen times as quick as the formulas; None where it cannot be traced."""
+    """Return the traced function as Python, a dozen times faster than the formulas; None where it cannot be traced."""
     try:
         tree = coefficient_tree(function)
     except NotNative:
@@ -93,13 +92,13 @@ def quick_form(function: CoefficientFunction) -> Computed | None:
 
 
 def raised(base: float, exponent: float) -> float:
-    """Return a power as Python has it, for the formulas of coefficients."""
+    """Return a power as Python computes it, for the formulas of coefficients."""
     power: float = base**exponent
     return power
 
 
 FORMULAS: dict[str, object] = {"math": math, "stored_real": stored_real, "raised": raised}
-"""What the formulas of coefficients call."""
+"""The names that the formulas of coefficients use."""
 
 
 class _Tree:
@@ -125,7 +124,7 @@ class _Tree:
         return build.function("coefficients", [*self._parameters, *kept_names(self._declared)], self._body)
 
     def _limit(self, number: int, limit: Limit) -> None:
-        """Add that a parameter is moved to its limits, as ``blocks.coefficients.limited`` does."""
+        """Add the limiting of a parameter, as in ``limited``."""
         prefix, body = f"l{number}_", self._body
         low, high, value = f"{prefix}low", f"{prefix}high", f"{prefix}{limit.parameter.lower()}"
         body += traced(limit.high, (self._period_s,), self._known, [high], f"{prefix}h")
@@ -149,7 +148,7 @@ class _Tree:
         self._known[limit.parameter] = build.name(value)
 
     def _relate(self, relation: Relation, number: int) -> list[ast.expr]:
-        """Add the relation between parameters, as ``evaluate_noting`` has it; return what it keeps."""
+        """Add the relation between parameters, as in ``evaluate_noting``; return the values that it keeps."""
         body = self._body
         body += traced(relation.holds, (), self._known, ["holds"], "r")
         names = [f"kept_now_{name.lower()}" for name in relation.parameters]

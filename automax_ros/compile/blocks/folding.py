@@ -1,6 +1,6 @@
-"""Constant folding and removal of dead code in Python syntax trees that come from step functions.
+"""Constant folding and removal of dead code in Python syntax trees of step functions.
 
-A name may also be bound to a table: ``Fold`` then asks for the expression of each of its elements.
+A name may also be bound to a table: ``Fold`` then requests the expression of each of its elements.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.BitAnd: operator.and_,
 }
 TableReader = Callable[[ast.expr], ast.expr]
-"""Gives the expression that reads a table's element of an index."""
+"""Returns the expression that reads a table's element at an index."""
 
 _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
@@ -35,7 +35,7 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
 
 
 def value_of(expression: ast.expr) -> Value | None:
-    """Return the value of a literal, with a sign or without; None for anything else."""
+    """Return the value of a literal with or without a sign; None for anything else."""
     if isinstance(expression, ast.Constant) and isinstance(expression.value, (int, float, bool, str)):
         return expression.value
     if isinstance(expression, ast.UnaryOp) and isinstance(expression.op, ast.USub):
@@ -46,7 +46,7 @@ def value_of(expression: ast.expr) -> Value | None:
 
 
 class Fold(ast.NodeTransformer):
-    """Puts expressions in the place of names and folds what becomes constant.
+    """Replaces names by expressions and folds constants.
 
     ``helpers`` may be called with constant arguments while folding.
     """
@@ -57,13 +57,13 @@ class Fold(ast.NodeTransformer):
         helpers: Mapping[str, Callable[..., object]],
         tables: Mapping[str, TableReader] | None = None,
     ) -> None:
-        """Take the expression for each name that is to be replaced, and what reads each name that is a table."""
+        """Create the transformer from the expression for each name to replace, and the reader of each table."""
         self._bindings = bindings
         self._helpers = helpers
         self._tables = tables or {}
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
-        """Read the element of a table; of a buffer just replace the names."""
+        """Read the element of a table; in one of a buffer only replace the names."""
         index = self.visit(node.slice)
         if isinstance(node.value, ast.Name) and node.value.id in self._tables:
             return self._tables[node.value.id](index)
@@ -80,7 +80,7 @@ class Fold(ast.NodeTransformer):
         return bound
 
     def visit_Tuple(self, node: ast.Tuple) -> ast.expr:
-        """Make a new tuple: the given one belongs to all calls of the block."""
+        """Create a new tuple: the given one is shared by all calls of the block."""
         return ast.Tuple([self.visit(item) for item in node.elts], node.ctx)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
@@ -118,7 +118,7 @@ class Fold(ast.NodeTransformer):
         return node
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
-        """Leave out operands that cannot decide, stop at one that does."""
+        """Remove operands that cannot decide the result, and those after one that does."""
         neutral = isinstance(node.op, ast.And)
         kept: list[ast.expr] = []
         for operand in (self.visit(item) for item in node.values):
@@ -144,7 +144,7 @@ class Fold(ast.NodeTransformer):
         return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
-        """Carry out a helper whose arguments are all constant; one that fails stays: a test may stand before it."""
+        """Execute a helper whose arguments are all constant; a call that fails stays: a test may come before it."""
         arguments = [self.visit(argument) for argument in node.args]
         values = [value_of(argument) for argument in arguments]
         if isinstance(node.func, ast.Name) and node.func.id in self._helpers and None not in values:
@@ -156,7 +156,7 @@ class Fold(ast.NodeTransformer):
 
 
 def fold_body(body: Iterable[ast.stmt], fold: Fold) -> list[ast.stmt]:
-    """Return statements with names replaced, constants folded and branches that cannot run left out."""
+    """Return statements with names replaced, constants folded and unreachable branches removed."""
     folded: list[ast.stmt] = []
     for statement in body:
         if isinstance(statement, ast.If):
@@ -182,7 +182,7 @@ def fold_body(body: Iterable[ast.stmt], fold: Fold) -> list[ast.stmt]:
 
 
 def _does_nothing(statement: ast.Assign) -> bool:
-    """Return whether an assignment gives a name its own value: what is left of ``total = total + 0``."""
+    """Return whether an assignment gives a name its own value, as ``total = total + 0`` does once folded."""
     target, value = statement.targets[0], statement.value
     return isinstance(target, ast.Name) and isinstance(value, ast.Name) and target.id == value.id
 
@@ -196,7 +196,7 @@ def _if(test: ast.expr, then: list[ast.stmt], otherwise: list[ast.stmt]) -> ast.
 def without_dead_stores(body: list[ast.stmt], needed: set[str]) -> list[ast.stmt]:
     """Return statements without assignments to names that nothing reads; ``needed`` are read afterwards.
 
-    A name that is read anywhere in the body, but for its own new value, counts as read: safe, and enough for step
+    A name that is read anywhere in the body, except for its own new value, counts as read: safe, and enough for step
     functions.
     """
     count = _count(body)
@@ -208,7 +208,7 @@ def without_dead_stores(body: list[ast.stmt], needed: set[str]) -> list[ast.stmt
 
 
 def _read(body: Iterable[ast.stmt]) -> set[str]:
-    """Return the names that statements read, each for another purpose than its own new value."""
+    """Return the names that statements read, not counting reads of a name for its own new value."""
     found: set[str] = set()
     for statement in body:
         if isinstance(statement, (ast.If, ast.While)):
@@ -226,7 +226,7 @@ def _names_read(node: ast.AST) -> set[str]:
 
 
 def _count(body: list[ast.stmt]) -> int:
-    """Return the number of statements, those inside others included."""
+    """Return the number of statements, including those inside others."""
     inner = [statement for statement in body if isinstance(statement, (ast.If, ast.While))]
     return len(body) + sum(_count(statement.body) + _count(statement.orelse) for statement in inner)
 

@@ -1,9 +1,8 @@
 """Inlining of a block's step function into the scan, from its syntax tree.
 
-The parameters become the expressions of the CALL, the locals get the block's prefix, constants fold, branches that
-cannot run and outputs that nobody programs disappear.
-
-Further simplification of an inlined step: literals and copies carried on, errors logged where they arise.
+The parameters become the expressions of the CALL, the locals get the block's prefix, constants are folded, unreachable
+branches and outputs that are not programmed are removed. Then literals and copies are propagated, and errors are logged
+where they occur.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ from automax_ros.compile.base import build
 from automax_ros.compile.blocks.folding import Fold, TableReader, fold_body, value_of, without_dead_stores
 
 MOST_ROUNDS = 8
-"""Rounds of carrying on; step functions need two or three."""
+"""Rounds of propagation; step functions need two or three."""
 
 
 def carry_on(
     body: list[ast.stmt], outputs: Mapping[str, ast.expr], own: frozenset[str]
 ) -> tuple[list[ast.stmt], dict[str, ast.expr]]:
-    """Put literals, and names that the body does not set, in the place of ``own`` locals that are set once to them."""
+    """Replace ``own`` locals that are set once by their values, if literals or names that the body does not set."""
     results = dict(outputs)
     for _ in range(MOST_ROUNDS):
         bindings = _carried(body, own)
@@ -80,7 +79,7 @@ def _without(body: list[ast.stmt], names: Mapping[str, ast.expr]) -> list[ast.st
 
 
 def log_in_place(body: list[ast.stmt], error: ast.expr, log: Callable[[ast.expr], ast.stmt]) -> list[ast.stmt]:
-    """Return the body with an error logged where it arises, or after the body where more than one may arise."""
+    """Return the body with an error logged where it occurs, or after the body where more than one may occur."""
     if isinstance(error, ast.Name) and _only_literals(body, error.id) and _most_errors(body, error.id) <= 1:
         return _logging(body, error.id, log)
     return [*body, build.when(error, [log(error)])]
@@ -100,7 +99,7 @@ def _sets(statement: ast.Assign, name: str) -> bool:
 
 
 def _most_errors(body: list[ast.stmt], name: str) -> int:
-    """Return how often at most one pass sets the error to a problem."""
+    """Return the most times that one pass can set the error to a problem."""
     most = 0
     for statement in body:
         if isinstance(statement, ast.If):
@@ -128,12 +127,12 @@ def _logging(body: list[ast.stmt], name: str, log: Callable[[ast.expr], ast.stmt
 
 
 _WRITES, _ERROR = "writes", "error"
-"""Keys among results by keyword, which are in upper case."""
+"""Keys among the results, whose other keys are keywords in upper case."""
 
 
 @dataclass(frozen=True)
 class StepTree:
-    """The syntax tree of a step function, taken apart."""
+    """The parts of a step function's syntax tree."""
 
     parameters: tuple[str, ...]
     body: tuple[ast.stmt, ...]
@@ -143,10 +142,10 @@ class StepTree:
 
 @dataclass(frozen=True)
 class Binding:
-    """What the names of a step function stand for in one CALL.
+    """The bindings of a step function's names in one CALL.
 
-    ``values`` has an expression, simple or without side effects, for each input, coefficient and fact of the CALL that
-    is programmed; ``states`` the Python name of each state, a data structure's included; ``tables`` what reads each
+    ``values`` has an expression, simple or without side effects, for each programmed input, coefficient and fact of the
+    CALL; ``states`` the Python name of each state, including those of a data structure; ``tables`` the reader of each
     table; ``prefix`` begins the name of every local.
     """
 
@@ -158,10 +157,10 @@ class Binding:
 
 @dataclass(frozen=True)
 class Inlined:
-    """Statements that carry a block out; the other fields are expressions valid after them.
+    """The statements that execute a block; the other fields are expressions valid after them.
 
     ``outputs`` stay valid while outputs are stored in the order of ``wanted``. ``writes`` says whether outputs that
-    hold are written. ``error`` is None where the block cannot log anything as it is programmed.
+    hold are written. ``error`` is None where the block as programmed cannot log anything.
     """
 
     body: list[ast.stmt]
@@ -172,10 +171,10 @@ class Inlined:
 
 @functools.cache
 def step_tree(block: Block) -> StepTree:
-    """Return the taken apart step function of a block.
+    """Return the parts of a block's step function.
 
     Raises:
-        TypeError: the function is not of the form that ``blocks.declaration`` asks for.
+        TypeError: the function does not have the form that ``blocks/declare/declaration`` requires.
     """
     if block.step is None:
         raise TypeError(f"{block.name} has no step function")
@@ -202,7 +201,7 @@ def step_tree(block: Block) -> StepTree:
 
 
 def _can_log_in_step(block: Block) -> bool:
-    """Return whether the step returns an error: all that is logged but coefficients out of limits comes from there."""
+    """Return whether the step returns an error: all but the coefficients' limits is logged from there."""
     return any(code != "AMX7004" for code in block.logs)
 
 
@@ -233,10 +232,10 @@ def inline(block: Block, binding: Binding, wanted: Mapping[str, str], free: froz
 
     Args:
         block: the declaration.
-        binding: what the step's names stand for.
+        binding: the bindings of the step's names.
         wanted: for each programmed output, in the order in which they are stored, the Python name it is stored in, ""
-            where it is stored otherwise.
-        free: targets of ``wanted`` that the block may compute in directly: nothing reads them meanwhile.
+            where it is stored differently.
+        free: targets of ``wanted`` in which the block may compute directly: nothing reads them meanwhile.
     """
     if binding.tables:
         return _inlined(block, binding, wanted, free)
@@ -256,13 +255,13 @@ _PREFIX = "_p_"
 
 
 class _StandIns:
-    """Names that stand for those of one CALL, numbered as they come: calls of one shape are inlined once."""
+    """Placeholders for the names of one CALL, numbered in their order: calls of one shape are inlined only once."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, str] = {}
 
     def of(self, name: str) -> str:
-        """Return what stands for a name."""
+        """Return the placeholder of a name."""
         return self._numbers.setdefault(name, f"_{len(self._numbers)}")
 
     def text(self, value: ast.expr) -> str:
@@ -272,7 +271,7 @@ class _StandIns:
         return ast.unparse(_renamed(value, self.of))
 
     def replaced(self, inlined: Inlined, prefix: str) -> Inlined:
-        """Return what was inlined with the names of the CALL in the place of those that stand for them."""
+        """Return an inlined block with the names of the CALL in place of their placeholders."""
         names = {number: name for name, number in self._numbers.items()}
 
         def name_of(name: str) -> str:
@@ -290,7 +289,7 @@ _Node = TypeVar("_Node", bound=ast.AST)
 
 
 def _renamed(node: _Node, name_of: Callable[[str], str]) -> _Node:
-    """Return a copy of a tree with its names replaced; what holds no names is shared."""
+    """Return a copy of a tree with its names replaced; nodes without names are shared."""
     if isinstance(node, ast.Name):
         return cast(_Node, _shared_name(name_of(node.id), isinstance(node.ctx, ast.Store)))
     if not isinstance(node, (ast.expr, ast.stmt)) or isinstance(node, ast.Constant):
@@ -300,7 +299,7 @@ def _renamed(node: _Node, name_of: Callable[[str], str]) -> _Node:
 
 @functools.lru_cache(maxsize=256)
 def _shared_name(identifier: str, stored: bool) -> ast.Name:
-    """Return one node for all places of a name: half of a task's tree are names, and a node takes its room."""
+    """Return one node for all uses of a name: half of a task's tree is names, and sharing saves memory."""
     return ast.Name(identifier, build.STORE if stored else build.LOAD)
 
 
@@ -360,9 +359,9 @@ def names_in(expression: ast.expr) -> set[str]:
 
 
 def _left_to_the_stores(body: list[ast.stmt], results: dict[str, ast.expr], own: frozenset[str]) -> list[ast.stmt]:
-    """Return the body without its last assignments to locals that are each one result: those are computed when stored.
+    """Return the body without its last assignments to locals that are single results: these are computed when stored.
 
-    Where the outputs are not written, nothing is then computed for them.
+    So nothing is computed for outputs that are not written.
     """
     names = {value.id: key for key, value in results.items() if isinstance(value, ast.Name)}
     nodes = [node for node in build.nodes(*body, *results.values()) if isinstance(node, ast.Name)]
@@ -378,7 +377,7 @@ def _left_to_the_stores(body: list[ast.stmt], results: dict[str, ast.expr], own:
 
 
 def _kept_apart(results: dict[str, ast.expr], wanted: Mapping[str, str], prefix: str) -> list[ast.Assign]:
-    """Return copies of results that the stores of other outputs would change, and put them in the results' place."""
+    """Return copies of results that the stores of other outputs would change, and replace the results by them."""
     copies: list[ast.Assign] = []
     stored: set[str] = set()
     for keyword in (*wanted, _WRITES):
@@ -398,7 +397,7 @@ def _names(
     wanted: Mapping[str, str],
     free: frozenset[str],
 ) -> tuple[dict[str, ast.expr], list[ast.stmt]]:
-    """Return the expression for each name of a step, and the statements that give assigned parameters their value."""
+    """Return the expression for each name of a step, and the statements that initialize assigned parameters."""
     prefix = binding.prefix
     opening: list[ast.stmt] = []
     names: dict[str, ast.expr] = {}
@@ -421,7 +420,7 @@ def _names(
 def _direct_target(
     local: str, results: Mapping[str, ast.expr], wanted: Mapping[str, str], free: frozenset[str]
 ) -> str | None:
-    """Return the output variable that a local of the step may be, so that no copy is needed."""
+    """Return the output variable that can replace a local of the step, so that no copy is needed."""
     for keyword, target in wanted.items():
         result = results[keyword.lower()]
         if target and target in free and isinstance(result, ast.Name) and result.id == local:
@@ -441,7 +440,7 @@ def _fleeting(block: Block, tree: StepTree) -> set[str]:
 
 
 def _store_states(block: Block, places: Mapping[str, str], results: Sequence[ast.expr]) -> list[ast.stmt]:
-    """Return the assignments of those states that are not already computed in place, all at once."""
+    """Return the assignments, in one statement, of the states that are not already computed in place."""
     pairs = [
         (places[state.name], result)
         for state, result in zip(block.states, results, strict=True)

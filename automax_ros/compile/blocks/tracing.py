@@ -1,8 +1,8 @@
-"""Python functions of REALs executed once on names instead of numbers: what they do with them is written down.
+"""Executes Python functions of REALs once on names instead of numbers, and records their operations.
 
 The coefficients of the dynamic blocks are computed by plain Python, with dictionaries, loops over polynomials, and
-functions that other functions return. None of that depends on the numbers: what is left is a row of operations, and
-tests between them where a function asks how two numbers compare.
+functions that other functions return. None of that depends on the numbers: the result is a sequence of operations, with
+tests between them where a function compares two numbers.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from automax_ros.compile.base import build
 from automax_ros.compile.base.native_source import NotNative
 
 MOST_PATHS = 64
-"""Ways through one function; those of the blocks have a few."""
+"""Most paths through one function; those of the blocks have a few."""
 _TRACED_PACKAGE = "automax_ros.blocks."
 
 
 class Traced:
-    """A REAL that has only a name yet."""
+    """A REAL of which only the name is known."""
 
     def __init__(self, recorder: Recorder, node: ast.expr) -> None:
-        """Take the recorder of what is done, and the name."""
+        """Create the value from the recorder of operations and its name."""
         self.recorder, self.node = recorder, node
 
     def _binary(self, operator: ast.operator, left: object, right: object) -> Traced:
@@ -98,10 +98,10 @@ class Traced:
 
 
 class Truth:
-    """How two numbers compare; whoever asks takes one way, the other is gone another time."""
+    """The comparison of two numbers; each evaluation follows one branch, a later run follows the other."""
 
     def __init__(self, recorder: Recorder, test: ast.expr) -> None:
-        """Take the recorder and the test."""
+        """Create the comparison from the recorder and the test."""
         self.recorder, self.test = recorder, test
 
     def __bool__(self) -> bool:
@@ -115,23 +115,23 @@ class _Fork(Exception):
 
 
 class Recorder:
-    """Writes down what one run of a function does after the last answer that it was given."""
+    """Records the operations of one run of a function after its last given answer."""
 
     def __init__(self, prefix: str, answers: Sequence[bool] = ()) -> None:
-        """Take what begins the names of results, and which way to go at each test."""
+        """Create the recorder from the prefix of the results' names, and the answer to each test."""
         self._prefix, self._answers = prefix, answers
         self._made, self._asked = 0, 0
         self.statements: list[ast.stmt] = []
 
     def kept(self, node: ast.expr) -> Traced:
-        """Write an operation down; return its result."""
+        """Record an operation; return its result."""
         self._made += 1
         name = f"{self._prefix}{self._made}"
         self.statements.append(build.assign(name, node))
         return Traced(self, build.name(name))
 
     def decided(self, test: ast.expr) -> bool:
-        """Return which way to go at a test."""
+        """Return the answer to a test."""
         if self._asked == len(self._answers):
             raise _Fork(test)
         self._asked += 1
@@ -140,7 +140,7 @@ class Recorder:
 
 
 def node_of(value: object) -> ast.expr:
-    """Return a traced value, or a number."""
+    """Return the node of a traced value, or of a number."""
     if isinstance(value, Traced):
         return value.node
     if isinstance(value, Truth):
@@ -157,19 +157,19 @@ def traced(
     prefix: str,
     keys: Sequence[str] = (),
 ) -> list[ast.stmt]:
-    """Return what a function does as statements that set ``results``.
+    """Return the operations of a function as statements that set ``results``.
 
     Args:
-        function: it is called with what stands ``before`` and a dictionary, and returns a value for each result in
-            order, or the one alone, or a dictionary that has them under ``keys``.
-        before: arguments that are known.
-        numbers: what the dictionary holds: numbers, and names as trees.
-        results: names.
-        prefix: begins the names of what lies between.
+        function: it is called with the arguments ``before`` and a dictionary, and returns a value for each result in
+            order, or a single one, or a dictionary that has them under ``keys``.
+        before: known arguments.
+        numbers: the content of the dictionary: numbers, and names as trees.
+        results: names of the results.
+        prefix: prefix of the names of intermediate results.
         keys: see above.
 
     Raises:
-        NotNative: the function needs the numbers themselves, or has too many ways through it.
+        NotNative: the function needs the numbers themselves, or has too many paths.
     """
     carried_out = _with_traced_functions(function, {})
     paths = 0
@@ -194,7 +194,7 @@ def traced(
 
 
 def _of_number(name: str, value: object) -> object:
-    """Return a function of the library, of a number at once."""
+    """Return the result of a function of ``math``: traced, or computed at once for a number."""
     if isinstance(value, Traced):
         return value.recorder.kept(build.call(build.attribute("math", name), value.node))
     return getattr(math, name)(value)
@@ -204,11 +204,11 @@ _MATH = SimpleNamespace(
     **{name: value for name, value in vars(math).items() if not name.startswith("_")}
     | {name: (lambda value, name=name: _of_number(name, value)) for name in ("tan", "sqrt", "log", "exp", "cos", "sin")}
 )
-"""``math`` with the functions that the blocks call on numbers and on names alike."""
+"""``math``, whose functions that the blocks call accept both numbers and names."""
 
 
 def _with_traced_functions(value: Any, made: dict[int, Any]) -> Any:
-    """Return a function of the blocks, and all that it calls, with ``_MATH`` in the place of ``math``."""
+    """Return a function of the blocks, and all its callees, with ``_MATH`` in place of ``math``."""
     if not isinstance(value, FunctionType) or not value.__module__.startswith(_TRACED_PACKAGE):
         return value
     if id(value) in made:
@@ -228,5 +228,5 @@ def _with_traced_functions(value: Any, made: dict[int, Any]) -> Any:
 
 
 def _names(code: Any) -> list[str]:
-    """Return the names that a function, and those written inside it, look up."""
+    """Return the names that a function and its inner functions look up."""
     return [*code.co_names, *(name for inner in code.co_consts if hasattr(inner, "co_names") for name in _names(inner))]

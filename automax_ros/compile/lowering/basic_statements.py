@@ -1,7 +1,7 @@
-"""Lowering of the statements of BASIC tasks: each place where a task can wait begins a basic block of its own.
+"""Lowering of the statements of BASIC tasks: each place where a task can wait begins a separate basic block.
 
 A statement that must wait (INPUT of an empty channel, PRINT to a full one) is executed again from its beginning when
-the task goes on, so PRINT sends the values of that time (decision).
+the task continues, so PRINT sends the values of that time (decision).
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class WaitingLowering(StatementLowering):
         return True
 
     def _jumps(self, statement: Statement) -> bool:
-        """Return whether a statement waits or jumps; every FOR counts, so that a loop can be left between two turns."""
+        """Return whether a statement waits or jumps; every FOR counts, so that a loop can suspend between two turns."""
         if type(statement) in _WAITING or isinstance(statement, For):
             return True
         if isinstance(statement, If):
@@ -142,10 +142,10 @@ class WaitingLowering(StatementLowering):
     # Channels and ports
 
     def _own_block(self, flow: Flow, statement: Statement) -> None:
-        """Begin a block that the task can come back to, with the time of the statement.
+        """Begin a block to which the task can return, with the time of the statement.
 
-        Always a new one: the numbers of blocks are the state's ``PC``, so they are the same in all forms and for all
-        execution times. A recorded modeled burst is replayed as an ideal one.
+        It is always a new one: the numbers of blocks are the state's ``PC``, so they are the same in all forms and for
+        all execution times. A recorded modeled burst is replayed as an ideal one.
         """
         self._next_block(flow)
         self._charge(statement)
@@ -168,7 +168,7 @@ class WaitingLowering(StatementLowering):
         self._next_block(flow)
 
     def _wait_if(self, flow: Flow, why: Suspension, number: int) -> ast.stmt:
-        """Return what suspends the task where an access must wait; it comes back to the present block."""
+        """Return the statement that suspends the task if an access must wait; it returns to the present block."""
         must = build.compare(build.name("outcome"), "<", build.constant(0))
         return build.when(must, [flow.to_block(flow.current), _return(why, build.constant(number))])
 
@@ -206,7 +206,7 @@ class WaitingLowering(StatementLowering):
         self._branch_if_waiting(flow, statement.empty)
 
     def _branch_if_waiting(self, flow: Flow, line: int | None) -> None:
-        """End the block: go on, or to the line of EMPTY= or FULL= where the access would have to wait."""
+        """End the block: continue, or go to the line of EMPTY= or FULL= if the access would have to wait."""
         if line is None:
             self._next_block(flow)
             return
@@ -284,7 +284,7 @@ class WaitingLowering(StatementLowering):
         self._wait_for_port(flow, statement)
 
     def _wait_for_port(self, flow: Flow, statement: InputFile | Get) -> None:
-        """Emit input from a port, where nothing ever comes (decision): wait for ever, or go to the line of EMPTY=."""
+        """Emit input from a port, where nothing ever arrives (decision): wait for ever, or go to the line of EMPTY=."""
         self._charge(statement)
         flag = self._flag(statement.file)
         self._log_if_closed(flag)

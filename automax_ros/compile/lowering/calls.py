@@ -3,10 +3,9 @@
 Block statements work on the latch: a simple common INTEGER, DOUBLE INTEGER or BOOLEAN is the Python local that the scan
 filled at its start. REALs, strings and array elements are read and written in actual memory (3.3).
 
-Lowering of the CALL that begins the scans of a drive's task: ``io.minor_loop`` executes it (52.0).
-
-Inputs are read, and outputs written, as those of any block: simple INTEGER and BOOLEAN commons in the latch, the others
-in actual memory. In a scan of modeled time the loop is executed at the end of the block's time (decision).
+The CALL that begins the scans of a drive's task is executed by ``io.minor_loop`` (52.0); its inputs are read, and its
+outputs written, as those of any block. In a scan of modeled time the loop is executed at the end of the block's time
+(decision).
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ from automax_ros.language.tree.tree import (
 )
 
 RESULT = "loop_outputs"
-"""The local that holds what ``io.minor_loop`` returned."""
+"""The local that holds the result of ``io.minor_loop``."""
 
 
 def lower_minor_loop(emitter: Emitter, bound: BoundCall) -> None:
@@ -86,7 +85,7 @@ def _lower(emitter: Emitter, bound: BoundCall) -> None:
 
 
 def _loop_input(emitter: Emitter, bound: BoundCall, item: Input) -> ast.expr:
-    """Return what the loop gets for an input: as programmed, its default, or None where it does without it."""
+    """Return the value of an input for the loop: as programmed, its default, or None where it needs none."""
     given = bound.arguments.get(item.name)
     if given is not None:
         return block_value(emitter, given)
@@ -94,7 +93,7 @@ def _loop_input(emitter: Emitter, bound: BoundCall, item: Input) -> ast.expr:
 
 
 def _records(emitter: Emitter, bound: BoundCall) -> ast.expr:
-    """Return the array of the task's own that an output of several dimensions names, None without one."""
+    """Return the task's own array that an output of several dimensions names, None without one."""
     for output in bound.block.outputs:
         given = bound.arguments.get(output.name)
         if output.dimensions and isinstance(given, Reference) and emitter.symbol(given.name).scope is Scope.LOCAL:
@@ -160,7 +159,7 @@ class BlockInstance:
 
 
 def instance_of(bound: BoundCall, prefix: str, occurrence: int, period_ns: int) -> BlockInstance:
-    """Return the instance that a CALL makes; ``occurrence`` counts the calls of one line from 0."""
+    """Return the instance of a CALL; ``occurrence`` counts the calls of one line from 0."""
     place = f"{bound.line}" if occurrence == 0 else f"{bound.line}.{occurrence + 1}"
     return BlockInstance(bound, f"{place} {bound.block.name}", prefix, _evaluated(bound, period_ns))
 
@@ -221,7 +220,7 @@ def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
 
 
 def _cost_of_search(emitter: Emitter, bound: BoundCall, inlined: Inlined) -> None:
-    """Emit the time of the elements that a block has searched, as many as its output tells."""
+    """Emit the time of the elements that a block has searched; its output gives their number."""
     element_ns = emitter.cost_model.element_ns(bound)
     if emitter.modeled and element_ns:
         last = emitter.keep(inlined.outputs[bound.block.searched_to])
@@ -231,7 +230,7 @@ def _cost_of_search(emitter: Emitter, bound: BoundCall, inlined: Inlined) -> Non
 
 
 def drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
-    """Emit that forced commons among a block's targets have the forced value, whatever the block gave them."""
+    """Emit the restoring of forced commons among a block's targets to their forced values."""
     names = [target.name for target in targets if isinstance(target, Reference) and target.name in emitter.forces]
     for name in dict.fromkeys(names):
         restore = build.assign(variable_name(name), build.name(latched_name(name)))
@@ -240,9 +239,9 @@ def drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
 
 @dataclass(frozen=True)
 class Place:
-    """Where an output goes: ``local`` is its Python name, "" where it lies in actual memory or in an array.
+    """The place of an output: ``local`` is its Python name, "" where it is in actual memory or in an array.
 
-    Of an array element ``index`` and ``in_range`` are what the subscripts tell before the block.
+    For an array element ``index`` and ``in_range`` come from its subscripts, evaluated before the block.
     """
 
     output: Output
@@ -253,7 +252,7 @@ class Place:
 
 
 def places_of(emitter: Emitter, bound: BoundCall) -> list[Place]:
-    """Return where the outputs go, in the order of the CALL; their subscripts are evaluated here, before the block."""
+    """Return the outputs' places, in the order of the CALL; their subscripts are evaluated here, before the block."""
     declared = {output.name: output for output in bound.block.outputs}
     given = [(declared[name], target) for name, target in bound.arguments.items() if name in declared]
     changing = frozenset(_local(emitter, target) for _, target in given)
@@ -269,7 +268,7 @@ def places_of(emitter: Emitter, bound: BoundCall) -> list[Place]:
 
 
 def _is_value(block: Block, item: Input) -> bool:
-    """Return whether the step can take an input as a value: no name, and no variable that coefficients come from."""
+    """Return whether an input is a value for the step: not a name, nor a variable that coefficients depend on."""
     if not isinstance(item.type, DataType):
         return False
     from_coefficients = block.coefficients is not None and item.name in block.coefficients.parameters
@@ -277,7 +276,7 @@ def _is_value(block: Block, item: Input) -> bool:
 
 
 def _input(emitter: Emitter, bound: BoundCall, item: Input) -> ast.expr:
-    """Return what the step gets for an input: as programmed, its default, or 0 where the block does without it."""
+    """Return the value of an input for the step: as programmed, its default, or 0 where the block needs none."""
     given = bound.arguments.get(item.name)
     if given is not None:
         return block_value(emitter, given)
@@ -286,7 +285,7 @@ def _input(emitter: Emitter, bound: BoundCall, item: Input) -> ast.expr:
 
 
 def _tables(emitter: Emitter, bound: BoundCall) -> dict[str, TableReader]:
-    """Return what reads the tables of a CALL; a common array is read from actual memory, as the block comes to it.
+    """Return the readers of a CALL's tables; a common array is read from actual memory when the block is executed.
 
     A block reads its table at one instant, also where execution times are modeled (decision).
     """
@@ -306,12 +305,12 @@ def _tables(emitter: Emitter, bound: BoundCall) -> dict[str, TableReader]:
 
 
 def _no_table(_index: ast.expr) -> ast.expr:
-    """Return what stands for an element of a table that is not programmed, which is never read."""
+    """Return a placeholder for an element of a table that is not programmed; it is never read."""
     return build.constant(0)
 
 
 def block_value(emitter: Emitter, given: Expression) -> ast.expr:
-    """Return what a block sees of a parameter."""
+    """Return the value of a parameter in a block."""
     if isinstance(given, (IntegerLiteral, RealLiteral, BooleanLiteral)):
         return build.constant(given.value)
     if isinstance(given, Unary):
@@ -323,7 +322,7 @@ def block_value(emitter: Emitter, given: Expression) -> ast.expr:
 
 
 def _real_value(emitter: Emitter, given: Expression) -> ast.expr:
-    """Return what coefficients are made of: a REAL, also where an INTEGER is given."""
+    """Return the value of a parameter for coefficients: a REAL, also where an INTEGER is given."""
     value = block_value(emitter, given)
     literal = value_of(value)
     if isinstance(literal, (int, float)):
@@ -332,7 +331,7 @@ def _real_value(emitter: Emitter, given: Expression) -> ast.expr:
 
 
 def _local(emitter: Emitter, target: Expression) -> str:
-    """Return the Python local that an output is stored in, "" where it has none or a force holds it."""
+    """Return the Python local in which an output is stored, "" where there is none or a force holds it."""
     if isinstance(target, Reference) and target.name not in emitter.held:
         symbol = emitter.symbol(target.name)
         if symbol.latched or target.name not in emitter.views:
@@ -341,7 +340,7 @@ def _local(emitter: Emitter, target: Expression) -> str:
 
 
 def _free(bindings: dict[str, ast.expr], outputs: list[Place]) -> frozenset[str]:
-    """Return the targets that a block may compute in: always written, no input reads them, no other output's target."""
+    """Return the targets in which a block may compute: always written, not read by inputs, used by one output only."""
     read = {name for binding in bindings.values() for name in names_in(binding)}
     targets = [place.local for place in outputs]
     always = {place.local for place in outputs if place.local and not place.output.holds}
@@ -349,7 +348,7 @@ def _free(bindings: dict[str, ast.expr], outputs: list[Place]) -> frozenset[str]
 
 
 def _store_when(emitter: Emitter, test: ast.expr, stores: list[tuple[Place, ast.expr]]) -> None:
-    """Emit the stores of outputs that hold: where they are not written, nothing looks at them either."""
+    """Emit the stores of outputs that hold: where they are not written, they are not read either."""
     fixed = value_of(test)
     if fixed is not None:
         store_all(emitter, stores if fixed else [])

@@ -1,7 +1,7 @@
 """Lowering of BASIC expressions to pure Python expressions (J-3675 chapter 5; semantics, BASIC).
 
-Integers are worked in 32 bits with clamping; static bounds tell where a clamp cannot be needed. There is no short
-circuit: what can fail is hoisted by the emitter, so Python's ``and`` sees only pure operands.
+Integers are computed in 32 bits with clamping; static bounds show where no clamp is needed. There is no short circuit:
+the emitter hoists operations that can fail, so the operands of Python's ``and`` are always pure.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from automax_ros.language.tree.tree import (
 )
 
 DEPTH_LIMIT = 40
-"""Depth at which a chain's value so far goes into a temporary, so that no Python tree grows too deep to compile."""
+"""Depth at which the value of a chain is stored in a temporary, so that no Python tree gets too deep to compile."""
 SUBSCRIPT = 7026
 
 
 @dataclass(frozen=True)
 class Lowered:
-    """A pure Python expression with its type; ``low`` and ``high`` bound an integer's value, ``depth`` the tree's."""
+    """A pure Python expression with its type; ``low`` and ``high`` bound an integer, ``depth`` is that of the tree."""
 
     node: ast.expr
     type: DataType
@@ -57,7 +57,7 @@ def of_type(node: ast.expr, kind: DataType) -> Lowered:
 
 
 def lower(emitter: Emitter, expression: Expression) -> Lowered:
-    """Return the Python form of a checked expression; what it needs before it is emitted."""
+    """Return the Python form of a checked expression; statements that it needs before it are emitted."""
     if isinstance(expression, Binary):
         return _lower_chain(emitter, expression)
     if isinstance(expression, Reference):
@@ -79,7 +79,7 @@ def lower(emitter: Emitter, expression: Expression) -> Lowered:
 
 
 def lower_element(emitter: Emitter, element: Element) -> Lowered:
-    """Return an array element's present value; out of range it is logged and the type's zero."""
+    """Return an array element's present value; an index out of range is logged and gives the type's zero."""
     index, in_range = lower_index(emitter, element)
     if in_range is None:
         return of_type(emitter.keep(emitter.read(element.name, index)), element.type)
@@ -95,7 +95,7 @@ def lower_element(emitter: Emitter, element: Element) -> Lowered:
 def lower_index(
     emitter: Emitter, element: Element, changing: frozenset[str] = frozenset()
 ) -> tuple[ast.expr, ast.expr | None]:
-    """Return an element's flat index, last subscript fastest, and the test that it is in range, if there is need.
+    """Return an element's flat index, last subscript fastest, and the test that it is in range, if one is needed.
 
     ``changing`` are Python names that get another value before the index is used.
     """
@@ -115,7 +115,7 @@ def lower_index(
 
 
 def clamped(emitter: Emitter, value: Lowered, kind: DataType, code: int) -> Lowered:
-    """Return an integer clamped to a type, an overflow noted; only where the bounds say that it can overflow."""
+    """Return an integer clamped to a type, with an overflow noted, where its bounds allow one."""
     low, high = _BOUNDS[kind]
     if low <= value.low and value.high <= high:
         return Lowered(value.node, kind, value.low, value.high)
@@ -135,7 +135,7 @@ def clamped(emitter: Emitter, value: Lowered, kind: DataType, code: int) -> Lowe
 def _lower_unary(emitter: Emitter, expression: Unary) -> Lowered:
     literal = expression.operand
     if expression.operator == "-" and isinstance(literal, IntegerLiteral) and literal.value >= 0:
-        # the sign belongs to the constant: -2147483648 is one, 2147483648 is none
+        # the sign is part of the constant: -2147483648 is valid, 2147483648 is not
         return Lowered(build.constant(-literal.value), DataType.DOUBLE, -literal.value, -literal.value)
     operand = lower(emitter, expression.operand)
     return _shallow(emitter, _signed(emitter, expression, operand), operand)
@@ -166,7 +166,7 @@ def _lower_chain(emitter: Emitter, expression: Binary) -> Lowered:
 
 
 def _shallow(emitter: Emitter, result: Lowered, *operands: Lowered) -> Lowered:
-    """Return the result of an operation with the depth that its operands give it; a deep one goes into a temporary."""
+    """Return the result of an operation with its depth, from that of its operands; a deep one goes into a temporary."""
     depth = 0 if build.is_simple(result.node) else 1 + max((operand.depth for operand in operands), default=0)
     if depth < DEPTH_LIMIT:
         return replace(result, depth=depth)
@@ -174,7 +174,7 @@ def _shallow(emitter: Emitter, result: Lowered, *operands: Lowered) -> Lowered:
 
 
 def _lower_sum(emitter: Emitter, operator: str, left: Lowered, right: Lowered) -> Lowered:
-    """+ - * of numbers (booleans count as 0 and 1), + of strings."""
+    """Lower + - * of numbers (booleans count as 0 and 1) and + of strings."""
     if left.type is DataType.STRING:
         return Lowered(emitter.operation("joined", left.node, right.node), DataType.STRING)
     node = build.binary(left.node, operator, right.node)

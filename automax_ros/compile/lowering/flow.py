@@ -1,8 +1,8 @@
 """The flow of control of a task with jumps: basic blocks in one ``while`` on an integer ``pc``.
 
-Blocks stand in the order of the source, so that a jump forward and the fall to the next block cost one comparison each;
-only a jump back takes another turn of the loop. Many blocks stand in groups, so that a turn finds its block with few
-comparisons, however long the task is.
+Blocks are in the order of the source, so that a jump forward and falling through to the next block cost one comparison
+each; only a jump back takes another turn of the loop. Many blocks are put into groups, so that a turn finds its block
+with few comparisons, however long the task is.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ GROUP = 16
 
 
 def jump_targets(statements: tuple[Statement, ...]) -> frozenset[int]:
-    """Return the line numbers that anything in the statements jumps to."""
+    """Return the line numbers to which the statements jump."""
     lines: set[int] = set()
     for statement in statements:
         lines.update(jumps_of(statement))
@@ -43,7 +43,7 @@ def jump_targets(statements: tuple[Statement, ...]) -> frozenset[int]:
 
 
 def is_jumping(statement: Statement, targets: frozenset[int]) -> bool:
-    """Return whether a statement jumps, is jumped to, or holds one that does: it cannot stand in straight code."""
+    """Return whether a statement jumps, is jumped to, or contains such a one: it cannot be straight code."""
     if isinstance(statement, JUMPS) or statement.number in targets:
         return True
     if isinstance(statement, If):
@@ -54,12 +54,12 @@ def is_jumping(statement: Statement, targets: frozenset[int]) -> bool:
 
 
 def count_statements(statements: tuple[Statement, ...]) -> int:
-    """Return how many statements stand in a suite, those inside its IF and FOR not included."""
+    """Return the number of statements of a suite, not counting those inside its IF and FOR."""
     return sum(not isinstance(statement, Label) for statement in statements)
 
 
 def before_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
-    """Return the statements before the task's END, after which only remarks stand; all if something jumps to those."""
+    """Return the statements before the task's END, after which only remarks come; all if something jumps to those."""
     targets = jump_targets(statements)
     for position, statement in enumerate(statements):
         if isinstance(statement, End):
@@ -92,7 +92,7 @@ class Flow:
         return len(self.blocks) - 1
 
     def count(self) -> None:
-        """Count one more statement that the block under construction executes."""
+        """Count one more statement of the block under construction."""
         self.counts[-1] += 1
 
     def to_block(self, number: int) -> ast.stmt:
@@ -104,11 +104,11 @@ class Flow:
         return self.to_block(self.current + 1)
 
     def to_line(self, line: int) -> ast.stmt:
-        """Return the statement that goes to a BASIC line, known or still to come."""
+        """Return the statement that goes to a BASIC line, already known or not."""
         return build.assign(PC, self.block_of(line))
 
     def block_of(self, line: int) -> ast.Constant:
-        """Return the number of the block of a BASIC line, known or still to come."""
+        """Return the number of the block of a BASIC line, already known or not."""
         place = ast.Constant(0)
         self._to_lines.append((place, line))
         return place
@@ -124,7 +124,7 @@ class Flow:
         return ast.Constant(0)
 
     def here(self, *places: ast.Constant) -> None:
-        """Set places that ``later`` gave to the block under construction."""
+        """Set block numbers that ``later`` returned to the block under construction."""
         for place in places:
             place.value = self.current
 
@@ -134,7 +134,7 @@ class Flow:
         return [build.assign(PC, build.constant(0)), self.blocks_loop(limit, [too_long])]
 
     def blocks_loop(self, limit: int, too_many: list[ast.stmt]) -> ast.stmt:
-        """Return the loop over all blocks, which begins where ``pc`` tells and leaves by ``too_many`` statements."""
+        """Return the loop over all blocks, which starts at ``pc`` and executes ``too_many`` beyond ``limit``."""
         for place, line in self._to_lines:
             place.value = self.labels[line]
         for place in self._to_end:
@@ -171,7 +171,7 @@ def _dispatched(blocks: list[list[ast.stmt]], first: int) -> list[ast.stmt]:
 
 
 def _turning(suite: list[ast.stmt], number: int) -> list[ast.stmt]:
-    """Return the end of block ``number`` with ``continue`` after each jump that does not surely lead forward."""
+    """Return the end of block ``number`` with ``continue`` after each jump that may lead back."""
     last = suite[-1]
     if isinstance(last, ast.If):
         return [*suite[:-1], ast.If(last.test, _turning(last.body, number), _turning(last.orelse, number))]

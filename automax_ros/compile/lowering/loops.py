@@ -40,7 +40,7 @@ class Loop:
 
     @property
     def may_be_idle(self) -> bool:
-        """Whether the step is known only at run time, and may be 0."""
+        """Whether the step is known only at run time and may be 0."""
         return value_of(self.step) is None
 
 
@@ -90,7 +90,7 @@ def loop_fields(loop: Loop) -> dict[str, StateField]:
 
 
 def loop_test(emitter: Emitter, loop: Loop) -> ast.expr:
-    """Return the test at the top of a turn; the variable is read as any BASIC statement reads it."""
+    """Return the test at the top of a turn; the variable is read as in any BASIC statement."""
     variable = emitter.read(loop.statement.variable.name)
     step = value_of(loop.step)
     if isinstance(step, (int, float)):
@@ -100,7 +100,7 @@ def loop_test(emitter: Emitter, loop: Loop) -> ast.expr:
 
 
 def end_turn(emitter: Emitter, loop: Loop) -> ast.expr | None:
-    """Emit NEXT: add the step; return the test that the sum left the variable's range, None where it cannot."""
+    """Emit NEXT: add the step; return the test whether the sum left the variable's range, None where it cannot."""
     target = loop.statement.variable
     present = of_type(emitter.read(target.name), target.type)
     total = build.binary(present.node, "+", loop.step)
@@ -116,7 +116,7 @@ def end_turn(emitter: Emitter, loop: Loop) -> ast.expr | None:
 
 
 def _bounds_of_sum(emitter: Emitter, loop: Loop, present: Lowered) -> tuple[int, int]:
-    """Return the bounds of variable + step; the loop's own limit bounds a variable that nothing else sets."""
+    """Return the bounds of variable + step; the loop's limit bounds a variable that nothing else sets."""
     low, high = present.low + loop.step_bounds[0], present.high + loop.step_bounds[1]
     if loop.stop_type is not DataType.REAL and _only_counts(emitter, loop):
         if loop.step_bounds[0] >= 0:
@@ -127,18 +127,18 @@ def _bounds_of_sum(emitter: Emitter, loop: Loop, present: Lowered) -> tuple[int,
 
 
 def _only_counts(emitter: Emitter, loop: Loop) -> bool:
-    """Return whether nothing but the loop itself can set its variable while it runs."""
+    """Return whether only the loop itself can set its variable while it runs."""
     return counts_alone(emitter.program, loop.statement)
 
 
 def counts_alone(program: Program, loop: For) -> bool:
-    """Return whether nothing but a loop can set its variable while it runs."""
+    """Return whether only a loop itself can set its variable while it runs."""
     name = loop.variable.name
     return program.symbols[name].scope is Scope.LOCAL and not _sets(program, loop.body, name)
 
 
 def _sets(program: Program, statements: tuple[Statement, ...], name: str) -> bool:
-    """Return whether statements of a loop may set a variable; a subroutine may. No jump leads back into a loop."""
+    """Return whether a loop's statements may set a variable, as a subroutine may. No jump leads back into a loop."""
     for statement, _ in statements_in_order(statements):
         if isinstance(statement, Gosub) or (isinstance(statement, OnJump) and statement.gosub):
             return True

@@ -85,7 +85,7 @@ class StatementLowering:
         return any(self._jumps(statement) for statement in statements)
 
     def _jumps(self, statement: Statement) -> bool:
-        """Return whether a statement cannot stand in straight code."""
+        """Return whether a statement cannot be straight code."""
         return is_jumping(statement, self._targets)
 
     # Straight code
@@ -110,10 +110,10 @@ class StatementLowering:
             self._branch(statement.otherwise)
         whole = build.when(condition, then, otherwise)
         self.emitter.emit(whole)
-        whole.lineno = line  # that of its test, whose temporaries belong to the line
+        whole.lineno = line  # the line of its test, to which the test's temporaries belong
 
     def _branch(self, statements: tuple[Statement, ...]) -> None:
-        """Emit a branch of an IF; where the way through may repeat, it counts its own statements."""
+        """Emit a branch of an IF; where the code may repeat, the branch counts its own statements."""
         number = count_statements(statements)
         if self._repeating and number:
             self.emitter.emit(build.add_to(STEPS, build.constant(number)))
@@ -202,7 +202,7 @@ class StatementLowering:
                 self._lower_straight((statement,))
 
     def _flow_one(self, flow: Flow, statement: Statement) -> None:
-        if isinstance(statement, (*JUMPS, If)):  # the others carry their time themselves
+        if isinstance(statement, (*JUMPS, If)):  # the others add their time themselves
             self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
         if isinstance(statement, Goto):
             self._next_block(flow, flow.to_line(statement.line))
@@ -390,7 +390,7 @@ class StatementLowering:
         self.emitter.emit(build.do(build.call(self.emitter.member("set_event"), build.constant(statement.event))))
 
     def _remark(self, _: Remark) -> None:
-        """A remark does nothing; its time is added by the frame of every statement."""
+        """Emit nothing for a remark; its time is added by the frame of every statement."""
 
 
 _Carry = Callable[[StatementLowering, Statement], None]

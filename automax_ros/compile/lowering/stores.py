@@ -28,9 +28,9 @@ def store(emitter: Emitter, target: Target, value: Lowered) -> None:
 
 
 def write_at(emitter: Emitter, name: str, index: ast.expr, in_range: ast.expr | None, value: ast.expr) -> None:
-    """Emit the store of a value, which may be written twice, into an array's element of a flat index.
+    """Emit the store of a value, which may be used twice, into an array's element at a flat index.
 
-    Where the test ``in_range`` fails it is logged and nothing is written.
+    Where the test ``in_range`` fails, this is logged and nothing is written.
     """
     if in_range is None:
         emitter.write(name, value, index)
@@ -42,12 +42,12 @@ def write_at(emitter: Emitter, name: str, index: ast.expr, in_range: ast.expr | 
 
 
 def converted(emitter: Emitter, name: str, kind: DataType, value: Lowered) -> ast.expr:
-    """Return a value as a variable takes it: truncated, clamped, rounded to 24 bits or cut to its length."""
+    """Return a value converted for a variable: truncated, clamped, rounded to 24 bits or cut to its length."""
     return converted_to(emitter, kind, emitter.symbol(name).length, value)
 
 
 def converted_to(emitter: Emitter, kind: DataType, length: int, value: Lowered) -> ast.expr:
-    """Return a value as a variable of a type takes it; ``length`` is a string's."""
+    """Return a value converted for a variable of a type; ``length`` is a string's."""
     if kind is DataType.STRING:
         literal = value_of(value.node)
         if isinstance(literal, str):
@@ -77,7 +77,7 @@ def _as_real(emitter: Emitter, value: Lowered) -> ast.expr:
 
 
 def printable(emitter: Emitter, item: Expression) -> ast.expr:
-    """Return an expression's value as PRINT takes it: a REAL is a REAL, whatever its literal."""
+    """Return an expression's value for PRINT: a REAL stays a REAL, whatever its literal."""
     value = lower(emitter, item)
     if type_of(item) is DataType.REAL and isinstance(literal := value_of(value.node), int):
         return build.constant(float(literal))

@@ -1,1 +1,1 @@
-"""Scans as machine code: translated to C, compiled, kept in a cache, called."""
+"""Scans as machine code: translated to C, compiled, cached, called."""

@@ -1,1 +1,1 @@
-"""Judges how a drive is set up, by the manual's formulas."""
+"""Judges the set-up of a drive by the manual's formulas."""

@@ -1,8 +1,6 @@
-"""Judges a drive by all rules that are for it.
+"""Judges a drive by all rules that apply to it.
 
-Gains for a drive's motor next to what is programmed: the proposals of ``drive/current_loop/proposals`` with their
-numbers.
-
+Programmed gains are compared with the proposals of ``drive/current_loop/proposals``, shown with their numbers.
 A gain that is within a factor of two of the proposal is fine (decision): the loop is not that particular.
 """
 
@@ -37,10 +35,10 @@ from automax_ros.drive.current_loop.proposals import (
 )
 
 NEAR = 2.0
-"""A factor between programmed and proposed up to which all is well."""
+"""Largest factor between a programmed and a proposed gain that is fine."""
 MOST_DELAY = 0.7
-"""Part of a sixth of a line cycle up to which the proposed gains keep their damping, whenever in it the scan's DELTA
-takes effect (decision)."""
+"""Largest computing delay with which the proposed gains keep their damping, as part of a sixth of a line cycle
+(decision)."""
 
 
 def _kp(circuit: Circuit) -> tuple[float, str]:
@@ -84,13 +82,13 @@ _PROPOSALS: dict[str, tuple[Callable[[Circuit], tuple[float, str]], str]] = {
         f"AG_FACTOR = integral gain where {LEAST_CONDUCTION * 100:g} % of a scan conduct / continuous one (ours)",
     ),
 }
-"""For each gain what computes it with its numbers, and the formula."""
+"""For each gain the function that computes it with its numbers, and the formula."""
 
 
 def computing_delay(case: DriveCase) -> Finding:
-    """Tell how late after its interrupt a scan's DELTA takes effect, and with what delay the gains are reckoned.
+    """Return how late after its interrupt a scan's DELTA takes effect, and the delay assumed for the gains.
 
-    The loop hears of each delay and reckons with it, so the same gains are right for all Processors (decision).
+    The loop is given each delay and allows for it, so the same gains are right for all Processors (decision).
     """
     formula = f"SCAN_LOOP with its latch + DC_DRIVE_CML (53) <= {MOST_DELAY:g} of a sixth of a line cycle (ours)"
     computing = case.computing
@@ -138,7 +136,7 @@ GAIN_RULES: tuple[Callable[[DriveCase], Finding], ...] = (
     computing_delay,
     *(partial(gain, keyword) for keyword in _PROPOSALS),
 )
-"""The delay with which the gains are reckoned, and a rule for each gain."""
+"""The rule for the computing delay, and a rule for each gain."""
 
 
 Rule = Callable[[DriveCase], Finding]
@@ -151,13 +149,13 @@ LOOP_RULES: tuple[Rule, ...] = (
     overcurrent,
     *GAIN_RULES,
 )
-"""The rules for a drive with a 57C406 and a loop in a task, in the order in which they are told."""
+"""The rules for a drive with a 57C406 and a loop in a task, in the order in which they are reported."""
 PMI_RULES: tuple[Rule, ...] = (pmi_overcurrent,)
 """The rules for a drive of a UDC, whose loop is in its power module's interface."""
 
 
 def assess(case: DriveCase | Unjudged) -> DriveFindings:
-    """Return what the rules say of a drive."""
+    """Return the findings of all rules that apply to a drive."""
     if isinstance(case, Unjudged):
         return DriveFindings(case.name, case.where, None, (Finding("plant", Verdict.ATTENTION, case.reason, ""),))
     rules = LOOP_RULES if case.registers else PMI_RULES

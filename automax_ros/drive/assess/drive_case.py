@@ -1,4 +1,4 @@
-"""A drive as its set-up is judged: what is known of it, and what came out of one rule."""
+"""The data by which a drive's set-up is judged, and the findings of the rules."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from automax_ros.drive.base.nameplate import DriveParameters
 
 
 class Verdict(enum.Enum):
-    """How a drive stands to a rule."""
+    """Result of a rule for a drive."""
 
     FINE = "fine"
     ATTENTION = "attention"
-    """A person should look at it: it depends on what is not known here."""
+    """To be checked by a person: it depends on data that are not known here."""
     WRONG = "wrong"
-    """The drive will not run, trip, or is not safe."""
+    """The drive will not run, will trip, or is not safe."""
 
 
 @dataclass(frozen=True)
 class Given:
-    """What is programmed: its value, None where that is not known, and in words where it comes from."""
+    """A programmed input: its value, None where that is not known, and its origin in words."""
 
     value: float | None
     text: str
@@ -31,10 +31,10 @@ class Given:
 
 @dataclass(frozen=True)
 class Computing:
-    """How long a scan computes until the 57C406 has its DELTA.
+    """The time that a scan computes until the 57C406 has its DELTA.
 
     Attributes:
-        modeled: whether the rack's execution takes that time; in ideal execution it is none.
+        modeled: whether the rack's execution takes that time; in ideal execution it takes none.
         model: the Processor that runs the task.
         delay_us: the time on that Processor, us.
         slowest: the slowest Processor that may run it.
@@ -57,15 +57,15 @@ class Computing:
 
 @dataclass(frozen=True)
 class DriveCase:
-    """A drive, as far as it is known.
+    """The known data of a drive.
 
     Attributes:
-        name: its plant.
+        name: name of its plant.
         where: the module that fires it, in words.
         parameters: the motor and its line.
         inertia: inertia of motor and load over the motor's own.
         source_ohm: resistance of a phase of the line, ohm.
-        task: the task with its current minor loop, "" where that is not a task's.
+        task: the task with its current minor loop, "" where no task has it.
         inputs: the inputs of DC_DRIVE_CML by keyword, those not programmed left out.
         threshold: register 4136.
         phase_step: register 4137.
@@ -109,12 +109,12 @@ class DriveCase:
 
     @property
     def most_n_m(self) -> float:
-        """Torque that the armature makes of its rated current with the whole field, N m, friction not taken off."""
+        """Torque of the armature at its rated current with the full field, N m, friction not subtracted."""
         return self.parameters.motor.k_v_s * self.parameters.amps
 
     @property
     def loop_inductance_h(self) -> float:
-        """Armature and two phases of the source, H."""
+        """Inductance of the armature and two phases of the source, H."""
         return self.parameters.motor.inductance_h + 2 * self.parameters.source_h
 
     def value(self, keyword: str) -> float | None:
@@ -123,22 +123,22 @@ class DriveCase:
         return None if given is None else given.value
 
     def text(self, keyword: str) -> str:
-        """Return what is known of an input, in words."""
+        """Return an input and its origin in words."""
         given = self.inputs.get(keyword)
         return "not known" if given is None else given.text
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What came out of one rule.
+    """The finding of one rule.
 
     Attributes:
-        rule: what was looked at, in a few words.
-        verdict: how it stands.
+        rule: the subject of the rule, in a few words.
+        verdict: the result.
         result: what was found, in a sentence.
-        formula: the manual's formula and where it stands.
-        numbers: the same with numbers; "" where one is not known.
-        values: what a program may want to know, by name with its unit.
+        formula: the manual's formula and its section.
+        numbers: the formula with numbers; "" where one is not known.
+        values: values for programs, by name with unit.
     """
 
     rule: str
@@ -151,7 +151,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Unjudged:
-    """A drive that nothing can be computed of: its name, its module, and why."""
+    """A drive for which nothing can be computed: its name, its module, and the reason."""
 
     name: str
     where: str
@@ -160,7 +160,7 @@ class Unjudged:
 
 @dataclass(frozen=True)
 class DriveFindings:
-    """All that was found of one drive; ``case`` is None where nothing could be computed."""
+    """All findings for one drive; ``case`` is None where nothing could be computed."""
 
     name: str
     where: str

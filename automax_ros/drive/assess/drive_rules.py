@@ -1,4 +1,4 @@
-"""What the manual's formulas say of a drive: each with its numbers put in, and whether all is well (52.4 to 52.6)."""
+"""The manual's formulas as rules for a drive: each with its numbers put in, and its verdict (52.4 to 52.6)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.base.nameplate import KG_M2_PER_LB_FT2
 
 PMI_TRIP_POINTS, PMI_MOST_TRIP = 75, 225
-"""By how much a PMI trips above the largest current, and its highest trip, % of rated current (S-3006 p. 109)."""
+"""Margin of a PMI's trip above the largest current, and its highest trip, % of rated current (S-3006 p. 109)."""
 
 
 def line_frequency(case: DriveCase) -> Finding:
@@ -101,9 +101,9 @@ def _jbar(case: DriveCase) -> float | None:
 def inertia_time(case: DriveCase) -> Finding:
     """JBAR, which says whether the threshold may be raised (52.4.1, equation 2).
 
-    WR2 is that of motor and load as the plant has them. T is what the armature makes of LIM_BAR of the rated current,
-    with the whole of its torque per ampere: what friction takes of it, and a load that brakes, could be missing. JBAR
-    is rounded down to a millisecond. Both err on the safe side (decision).
+    WR2 is that of motor and load in the plant. T is the armature's torque at LIM_BAR of the rated current, with its
+    full torque per ampere: friction and a braking load, which reduce it, could be absent. JBAR is rounded down to a
+    millisecond. Both err on the safe side (decision).
     """
     formula = "JBAR = (WR x WR x SB) / (308 T) >= 0.2 s (52.4.1, equation 2)"
     jbar = _jbar(case)
@@ -144,7 +144,7 @@ def line_synchronization(case: DriveCase) -> Finding:
 
 
 def bridge_change(case: DriveCase) -> Finding:
-    """The armature inductance against table 3, and what else fast bridge change needs (52.6)."""
+    """The armature inductance against table 3, and the other conditions of fast bridge change (52.6)."""
     inductance = case.parameters.motor.inductance_h * 1e3
     column = table_3_line_v(case.parameters.line_v)
     formula = "largest inductance = K / RATED I (every number of table 3, 52.6)"

@@ -17,7 +17,7 @@ DEFAULT_THRESHOLD_DEG, LARGEST_THRESHOLD_DEG = Measured(0).tach_threshold, TACH_
 DEFAULT_PHASE_STEP_US, DEFAULT_PERIOD_STEP_US = Measured(0).phase_step, Measured(0).period_step
 """Registers 4137 and 4138 after initialisation, us per line cycle (52.5.1)."""
 LEAST_JBAR_S = 0.2
-"""JBAR from which on the threshold may be raised, s (52.4.1, equation 2)."""
+"""Least JBAR with which the threshold may be raised, s (52.4.1, equation 2)."""
 OVERCURRENT_RATIO = 1.8
 """IOC_THRESH must be less than this times LIM_BAR (52.1.5)."""
 TABLE_3_MH_A: dict[float, float] = {230.0: 1264.7127, 460.0: 2346.575, 575.0: 3161.781, 660.0: 3519.8625}
@@ -36,7 +36,7 @@ def delta_bound_deg(armature_v: float, line_v: float) -> float:
         line_v: nominal line-to-line voltage, V rms.
 
     Raises:
-        ParameterError: this line cannot give three quarters of that voltage.
+        ParameterError: this line cannot supply three quarters of that voltage.
     """
     require("armature voltage in V", armature_v, 0.0, LARGEST, above=True)
     require("line-to-line voltage in V", line_v, SMALLEST, LARGEST)
@@ -79,7 +79,7 @@ def largest_inductance_mh(column_v: float, rated_amps: float) -> float:
 
 
 def boundary_amps(line_v: float, line_hz: float, inductance_h: float) -> float:
-    """Return the mean current, A, at which it just becomes continuous at alpha 90 degrees, where that takes most.
+    """Return the mean current, A, from which it is continuous at alpha 90 degrees, where the limit is highest.
 
     Args:
         line_v: line-to-line voltage, V rms.
@@ -92,7 +92,7 @@ def boundary_amps(line_v: float, line_hz: float, inductance_h: float) -> float:
 
 
 def ripple_amps(line_v: float, line_hz: float, inductance_h: float) -> float:
-    """Return by how much the peak is above the mean of a continuous current at alpha 90 degrees, A; arguments likewise.
+    """Return the peak of a continuous current at alpha 90 degrees above its mean, A; arguments as ``boundary_amps``.
 
     The current rises by sqrt(2) V / (w L) x (1 - sin 60 deg) from its lowest value, which is the boundary current below
     the mean.

@@ -1,1 +1,1 @@
-"""What the parts of a drive share: the motor and its plate, sensors, states, errors."""
+"""Shared by the parts of a drive: the motor and its name plate, sensors, states, errors."""

@@ -1,4 +1,4 @@
-"""What can be wrong with a power circuit or with what it is asked to do."""
+"""Errors in the data of a power circuit, or in commands to it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ LARGEST = 1e6
 """Largest voltage (V), resistance (ohm), inductance (H) ... of any circuit (decision: beyond every machine, far from
 where numbers overflow)."""
 SMALLEST = 1e-9
-"""Smallest value of what must be above 0."""
+"""Smallest value of a parameter that must be above 0."""
 
 
 class DriveError(Exception):
-    """Something about a power circuit is wrong; the text says what, where and what to do."""
+    """Base of the errors of a power circuit; the text says what is wrong, where, and what to do."""
 
 
 class ParameterError(DriveError):
@@ -20,7 +20,7 @@ class ParameterError(DriveError):
 
 
 class GateError(DriveError):
-    """A gate command that the bridge cannot take: an SCR that it has not, or an instant that has passed."""
+    """A gate command that the bridge cannot execute: an SCR that it does not have, or an instant that has passed."""
 
 
 class SourceShortError(DriveError):
@@ -32,10 +32,10 @@ class SteadyStateError(DriveError):
 
 
 def require(name: str, value: float, low: float, high: float = math.inf, *, above: bool = False) -> float:
-    """Return a parameter that lies in low..high; ``above`` excludes low itself.
+    """Return a parameter that is in low..high; ``above`` excludes low itself.
 
     Raises:
-        ParameterError: it does not, or is not a finite number.
+        ParameterError: it is outside the range, or not a finite number.
     """
     if math.isfinite(value) and (value > low if above else value >= low) and value <= high:
         return value

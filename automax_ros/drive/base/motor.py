@@ -1,4 +1,4 @@
-"""What the bridge feeds: a resistance, inductance and EMF; or a DC motor with field, inertia, friction and load."""
+"""Loads of the bridge: a resistance, inductance and EMF; or a DC motor with field, inertia, friction and load."""
 
 from __future__ import annotations
 
@@ -13,37 +13,37 @@ from automax_ros.drive.base.state import SavedState, Stateful, check_names
 SpeedLoad = Callable[[float], float]
 """A load torque (N m) that depends on the speed (rad/s), such as a fan's; positive torque brakes positive speed."""
 LoadCallback = Callable[[float, float], float]
-"""A load torque (N m) asked for in every interval with the time (s) and the speed (rad/s)."""
+"""A load torque (N m), called in every interval with the time (s) and the speed (rad/s)."""
 TURN: Final = 2 * pi
 LONGEST_NS: Final = 3_500_000
 SHORTEST_NS: Final = 500_000
-"""An interval of constant EMF: at most just over a firing interval at 48 Hz, at least this."""
+"""Bounds of an interval of constant EMF: at most just over a firing interval at 48 Hz, at least this."""
 HELD_V_S: Final = 1e-3
 """The EMF is held over an interval so short that its slope times the interval's square stays below this, V s (decision:
 0.1 % of what the line gives in a firing interval; keeps the error of speed below 0.01 %)."""
 LONGEST_S2: Final = (LONGEST_NS * 1e-9) ** 2
 SMOOTH_S: Final = 5e-3
-"""The acceleration that decides it is smoothed with this time constant: ripple does not count."""
+"""Time constant that smooths the acceleration which sets the interval's length, so that ripple does not count."""
 REPAID_S: Final = 1e-3
-"""Within this time (s), or an interval if that is longer, what the last EMF was off by is made good."""
+"""Time (s) within which the error of the last EMF is corrected, or an interval if that is longer."""
 
 
 class Machine(Stateful):
-    """What a circuit asks of its load. A class, not a Protocol: compiled, its methods are called without a lookup."""
+    """Interface of a circuit's load. A class, not a Protocol: compiled, its methods are called without a lookup."""
 
     inductance_h: float
     resistance_ohm: float
     turns: bool
-    """Whether the EMF can change by itself: ``advance`` is called for each interval."""
+    """Whether the EMF can change: then ``advance`` is called for each interval."""
     step_ns: int
-    """The longest interval that the EMF may be held, ns."""
+    """The longest interval for which the EMF may be held, ns."""
 
     def emf(self, duration_s: float) -> float:
         """Return the EMF (V) expected in the middle of the next ``duration_s``."""
         raise NotImplementedError
 
     def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
-        """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
+        """Advance by a time (s) in which a charge (C) flowed through the armature and its current changed (A)."""
         raise NotImplementedError
 
 
@@ -78,14 +78,14 @@ SETTLED: Final = 1e-9
 
 @dataclass
 class FieldWinding(Stateful):
-    """The field: flux of its current, which follows its voltage with a time constant.
+    """The field: its current follows its voltage with a time constant, and its flux follows the current.
 
     ``flux = (1 + s) x / (s + x)`` with x the current and flux over rated, s = ``knee`` (0.5 is a usual machine's).
     Without a knee the flux is proportional to the current (decision).
 
     Attributes:
         tau_s: time constant of the field current, s; 0 for none.
-        knee: how late the iron saturates, above 0; None for a straight line.
+        knee: saturation of the iron, above 0, later the larger it is; None for a straight line.
         current: field current over rated.
         voltage: field voltage over rated; loss of field is 0.
     """
@@ -107,11 +107,11 @@ class FieldWinding(Stateful):
         return (1 + self.knee) * current / (self.knee + abs(current))
 
     def flux(self, ahead_s: float) -> float:
-        """Return the flux over rated after ``ahead_s`` (s) of the present voltage."""
+        """Return the flux over rated after ``ahead_s`` (s) at the present voltage."""
         return self.flux_of(self._current(ahead_s))
 
     def advance(self, time_s: float) -> None:
-        """Let time pass at the present voltage; exact."""
+        """Advance by a time (s) at the present voltage; exact."""
         self.current = self._current(time_s)
 
     def _current(self, ahead_s: float) -> float:
@@ -165,10 +165,10 @@ class MotorData:
 class Motor(Machine):
     """A DC motor on its shaft: a ``Machine`` whose EMF follows the speed.
 
-    The EMF is constant within an interval, at the value that the last acceleration lets expect in its middle; the
-    mechanics take the exact charge of the interval. The volt-seconds by which the expectation was off are made good
-    in the next interval, so that errors do not add up: below 0.01 % of speed in a start at full voltage
-    (``test/drive/test_energy``).
+    The EMF is constant within an interval, at the value that the last acceleration predicts for its middle; the
+    mechanics use the exact charge of the interval. The error of the prediction in volt-seconds is corrected in the next
+    interval, so that errors do not add up: below 0.01 % of speed in a start at full voltage
+    (``test/drive/circuit/test_energy``).
     """
 
     _kept = (
@@ -186,15 +186,15 @@ class Motor(Machine):
         speed_rad_s: float = 0.0,
         held: bool = False,
     ) -> None:
-        """Begin at a speed.
+        """Create the motor at a speed.
 
         Args:
             data: the constants.
             load: load torque in N m, which keeps its direction at any speed (a hoist), or a function of speed.
-            load_callback: a load torque that is asked for, in addition.
+            load_callback: a callback for additional load torque.
             field: the field; constant and rated without it.
             speed_rad_s: the speed at the start.
-            held: whether something keeps the shaft at that speed whatever the torque; ``load_j`` is what it takes.
+            held: whether the shaft is held at that speed whatever the torque; ``load_j`` is the energy that this takes.
         """
         self.data = data
         self.resistance_ohm = data.resistance_ohm
@@ -228,7 +228,7 @@ class Motor(Machine):
 
     @property
     def kinetic_j(self) -> float:
-        """The energy in the inertia, J; ``shaft_j`` taken in equals what this gained, ``friction_j`` and ``load_j``."""
+        """The kinetic energy, J; ``shaft_j`` is the sum of its increase, ``friction_j`` and ``load_j``."""
         return 0.5 * self.inertia_kg_m2 * self.speed_rad_s**2
 
     def emf(self, duration_s: float) -> float:
@@ -249,7 +249,7 @@ class Motor(Machine):
         return torque
 
     def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
-        """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
+        """Advance by a time (s) in which a charge (C) flowed through the armature and its current changed (A)."""
         before, k_v_s = self.speed_rad_s, self.k_v_s
         self.torque_n_m = torque = k_v_s * charge_c / duration_s
         if self.held:
@@ -262,7 +262,7 @@ class Motor(Machine):
             self._turn(duration_s, torque, load)
             after = self.speed_rad_s
             self.acceleration = (after - before) / duration_s
-            # The mean speed: of both ends, less what a torque that rose in between came too late for.
+            # The mean speed: of both ends, corrected for a torque that rose only during the interval.
             mean = 0.5 * (before + after) - k_v_s * change_a * duration_s / (12.0 * self.inertia_kg_m2)
         self._owed_v_s += (k_v_s * mean - self._emf) * duration_s
         self._smooth = smooth = self._smooth + (self.acceleration - self._smooth) * (
@@ -284,7 +284,7 @@ class Motor(Machine):
         return super().state() | {"field": field, "load": self._steady_nm if self._load_of is None else None}
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over; a load that is a function stays the motor's own.
+        """Restore a state; a load that is a function is not replaced.
 
         Raises:
             ParameterError: it is not the state of such a motor.
@@ -299,7 +299,7 @@ class Motor(Machine):
             self.load = state["load"]
 
     def _turn(self, time_s: float, torque: float, load: float) -> None:
-        """Let constant torques (N m) act for a time; trapezoidal in speed, so that the energies add up exactly."""
+        """Apply constant torques (N m) for a time; trapezoidal in speed, so that the energies add up exactly."""
         data, speed = self.data, self.speed_rad_s
         drive = torque - load + self.coupling_n_m
         rubbing = data.coulomb_n_m
@@ -312,7 +312,7 @@ class Motor(Machine):
                 rubbing = -rubbing
         drag = 0.5 * data.viscous_n_m_s * time_s / self.inertia_kg_m2
         after = (speed * (1.0 - drag) + time_s * (drive - rubbing) / self.inertia_kg_m2) / (1.0 + drag)
-        if rubbing and speed * after < 0.0:  # comes to rest on the way, where friction may hold it
+        if rubbing and speed * after < 0.0:  # comes to rest within the time, and friction may hold it there
             part = time_s * speed / (speed - after)
             self._move(part, 0.5 * speed, torque, load, rubbing)
             self.speed_rad_s = 0.0
@@ -322,7 +322,7 @@ class Motor(Machine):
         self.speed_rad_s = after
 
     def _hold(self, time_s: float, torque: float) -> None:
-        """Let a torque (N m) act for a time on a shaft whose speed something keeps: that takes what is left of it."""
+        """Apply a torque (N m) for a time to a held shaft: its holder absorbs what friction leaves."""
         data, speed = self.data, self.speed_rad_s
         rubbing = data.coulomb_n_m * ((speed > 0.0) - (speed < 0.0))
         left = torque + self.coupling_n_m - rubbing - data.viscous_n_m_s * speed

@@ -1,7 +1,6 @@
-"""A drive's parameters from the motor's name plate: each value with the rule it came from.
+"""A drive's parameters from the motor's name plate, each value with the rule that it came from.
 
-The rules are textbook practice; a measured value replaces its rule. The three example motors are plausible, not real
-ones.
+The rules are textbook practice; a measured value replaces its rule. The three example motors are plausible, not real.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ LINE_OF_ARMATURE_V = {240: 230, 500: 460, 600: 575, 700: 660}
 
 @dataclass(frozen=True)
 class NamePlate:
-    """What is written on a motor, and what somebody measured.
+    """The data on a motor's name plate, and measured values.
 
     Attributes:
         hp: rated shaft power, horsepower.
@@ -30,13 +29,13 @@ class NamePlate:
         efficiency: rated efficiency, for a plate without amps.
         poles: number of poles.
         compensated: whether there is a compensating winding.
-        line_v: line-to-line voltage, V rms; None takes the drive's usual one.
+        line_v: line-to-line voltage, V rms; None means the drive's usual one.
         line_hz: line frequency, Hz.
         source_pu: source reactance, per unit of the drive's rating.
         resistance_ohm: measured armature resistance; None derives it.
         resistance_pu: armature resistance over rated volts / amps, where it is not measured; None derives it from hp.
         inductance_h: measured armature inductance; None derives it.
-        inertia_kg_m2: measured inertia at the shaft, kg m2; None takes ``wk2_lb_ft2``.
+        inertia_kg_m2: measured inertia at the shaft, kg m2; None means ``wk2_lb_ft2``.
         wk2_lb_ft2: inertia at the shaft, lb ft2; None derives it.
     """
 
@@ -68,7 +67,7 @@ class Value:
 
 @dataclass(frozen=True)
 class DriveParameters:
-    """What the plate makes of a drive.
+    """The parameters of a drive, derived from the name plate.
 
     Attributes:
         motor: the motor's constants.
@@ -141,7 +140,7 @@ def _resistance(plate: NamePlate, amps: float) -> Value:
     if plate.resistance_pu is not None:
         part = require("resistance per unit", plate.resistance_pu, 0.0, 0.5, above=True)
         return Value(part * plate.volts / amps, "ohm", f"{100 * part:g} % of volts / amps, as given")
-    # Through 8 % at 10 hp and 2.8 % at 800 hp: it falls with size.
+    # A curve through 8 % at 10 hp and 2.8 % at 800 hp.
     part = min(0.12, max(0.02, 0.08 * (plate.hp / 10) ** -0.24))
     return Value(part * plate.volts / amps, "ohm", f"{100 * part:.1f} % of volts / amps: 8 % x (hp / 10)^-0.24")
 

@@ -1,4 +1,4 @@
-"""Tachometer and resolver on a motor's shaft, with loss and with noise from a seeded source of their own."""
+"""Tachometer and resolver on a motor's shaft, with loss of signal and seeded noise."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ class _Sensor(Stateful):
     """A sensor with a source of noise."""
 
     def __init__(self, seed: int) -> None:
-        """Begin sound; readings repeat for the same seed."""
+        """Create a sound sensor; readings repeat for the same seed."""
         self.lost = False
         self._random = Random(seed)
 
     def state(self) -> SavedState:
-        """Return whether it is lost, and where its noise has come to."""
+        """Return whether it is lost, and the position in its noise sequence."""
         version, words, following = self._random.getstate()
         return super().state() | {"noise": [version, list(words), following]}
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over; the readings that follow are those that would have followed.
+        """Restore a state; readings continue as they would have from it.
 
         Raises:
             ParameterError: it is not the state of such a sensor.
@@ -43,15 +43,15 @@ class Tachometer(_Sensor):
     """A voltage in proportion to speed.
 
     Attributes:
-        volts_per_rad_s: the gain, V s/rad; negative where it is wired the wrong way round.
+        volts_per_rad_s: the gain, V s/rad; negative where its wires are swapped.
         noise_v: standard deviation of the noise, V.
-        lost: whether it has come off: it reads noise about 0.
+        lost: whether it has come off: it then reads noise about 0.
     """
 
     _kept = ("volts_per_rad_s", "noise_v", "lost")
 
     def __init__(self, volts_per_1000_rpm: float, *, noise_v: float = 0.0, seed: int = 0) -> None:
-        """Begin sound; readings repeat for the same seed."""
+        """Create a sound tachometer; readings repeat for the same seed."""
         super().__init__(seed)
         self.volts_per_rad_s = volts_per_1000_rpm * 60 / (1000 * TURN)
         self.noise_v = require("noise in V", noise_v, 0.0)
@@ -75,7 +75,7 @@ class Resolver(_Sensor):
     _kept = ("noise_rad", "lost", "_last")
 
     def __init__(self, counts: int = 4096, *, speed: int = 1, noise_rad: float = 0.0, seed: int = 0) -> None:
-        """Begin sound at count 0; readings repeat for the same seed."""
+        """Create a sound resolver at count 0; readings repeat for the same seed."""
         super().__init__(seed)
         self.counts = int(require("counts of a turn", counts, 2, 1 << 24))
         self.speed = int(require("speed of the resolver", speed, 1, 64))

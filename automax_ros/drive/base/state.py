@@ -1,6 +1,6 @@
-"""What the future of a part depends on, as plain data that JSON keeps bit for bit: taken now, restored later.
+"""The state of a part as plain data that JSON keeps bit for bit: saved now, restored later.
 
-A state belongs to a part that was made alike: constants (impedances, ratings, functions of load) are not in it.
+A state fits only a part created from the same data: constants (impedances, ratings, load functions) are not in it.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ class Stateful:
     _kept: ClassVar[tuple[str, ...]] = ()
 
     def state(self) -> SavedState:
-        """Return all that the part's future depends on, besides what it was made of."""
+        """Return all that the part's future depends on, apart from the data that it was created from."""
         return {name: _plain(getattr(self, name)) for name in self._kept}
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over; what comes then is what would have come after ``state()``, bit for bit.
+        """Restore a state; the part then continues as after ``state()``, bit for bit.
 
         Raises:
             ParameterError: it is not the state of such a part.
@@ -39,10 +39,10 @@ class Stateful:
 
 
 def check_names(part: str, state: SavedState, names: tuple[str, ...]) -> None:
-    """Check that a state holds what it must.
+    """Check that a state has exactly the required names.
 
     Raises:
-        ParameterError: something is missing or too much.
+        ParameterError: a name is missing or not expected.
     """
     if set(state) != set(names):
         raise ParameterError(f"this is not the state of a {part}: it needs {', '.join(names) or 'nothing'}")

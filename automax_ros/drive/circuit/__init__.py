@@ -1,1 +1,1 @@
-"""The power circuit: line, SCRs, conduction from event to event, in closed form."""
+"""The power circuit in closed form: line, SCRs, conduction from event to event."""

@@ -1,10 +1,10 @@
-"""The three-phase line: voltage and frequency that move, rotation, source impedance, missing phases.
+"""The three-phase line: variable voltage and frequency, rotation, source impedance, missing phases.
 
-In every segment the phase voltages are sinusoids of constant amplitude and frequency, so the circuit's solution is
-closed. A line at rest is one segment. While frequency or voltage moves, segments are short (``SEGMENT_NS``)
-and carry its mean over the segment: the angle at the end of each is exact and continuous; within one it is off by at
+In every segment the phase voltages are sinusoids of constant amplitude and frequency, so the circuit has a closed
+solution. A line at rest is one segment. While frequency or voltage changes, segments are short (``SEGMENT_NS``) and use
+its mean over the segment: the angle at the end of each is exact and continuous. Within a segment the angle is off by at
 most pi rate segment^2 / 4 (6e-6 rad at 28 Hz/s), and a voltage that settles with tau by segment / (2 tau) of its
-remaining way.
+remaining change.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from automax_ros.drive.base.state import SavedState, Stateful, check_names
 from automax_ros.drive.circuit.scr import PHASES
 
 SEGMENT_NS: Final = 500_000
-"""Longest segment while the line moves, ns."""
+"""Longest segment while voltage or frequency changes, ns."""
 REBASE_NS: Final = 1_000_000_000
-"""The angle is counted from an instant at most this long ago, so that days pass without loss of digits."""
+"""The angle is counted from an instant at most this long ago, so that no digits are lost over days, ns."""
 LOWEST_HZ: Final = 48.0
 HIGHEST_HZ: Final = 62.0
 
@@ -37,7 +37,7 @@ class Rotation(enum.Enum):
 
 @dataclass
 class _Course(Stateful):
-    """A quantity on its way to a target, at a constant rate (1/s) or with a time constant (s)."""
+    """A quantity that approaches a target at a constant rate (1/s) or with a time constant (s)."""
 
     value: float
     target: float
@@ -54,7 +54,7 @@ class _Course(Stateful):
             self.value = target
 
     def longest_s(self) -> float:
-        """How long the present law holds (s): a ramp ends at its target."""
+        """The time for which the present law applies (s): a ramp ends at its target."""
         return abs(self.target - self.value) / self.rate if self.rate else 1e9
 
     def after(self, time_s: float) -> float:
@@ -85,7 +85,7 @@ Change = tuple[str, float, float, float]
 
 
 class AcLine(Stateful):
-    """A three-phase line with isolated neutral; belongs to one circuit, which lets its time pass.
+    """A three-phase line with isolated neutral; belongs to one circuit, which advances it.
 
     Phase x has the voltage ``amplitude_v cos(angle + shift[x])`` to the neutral; A's shift is 0, B's -120 degrees on
     a line that rotates A, B, C.
@@ -104,16 +104,16 @@ class AcLine(Stateful):
         missing: Iterable[int] = (),
         angle_rad: float = 0.0,
     ) -> None:
-        """Begin at 0 ns.
+        """Create the line at 0 ns.
 
         Args:
             v_ll_v: line-to-line voltage, V rms.
             frequency_hz: 48 to 62 Hz.
-            inductance_h: source inductance of each phase, H, 0 for commutation in no time.
+            inductance_h: source inductance of each phase, H, 0 for instantaneous commutation.
             resistance_ohm: source resistance of each phase, ohm.
             rotation: the order of the phases.
-            missing: phases (0, 1, 2) that are not there from the start.
-            angle_rad: the angle at 0 ns, rad: phase A's maximum is where the angle is 0.
+            missing: phases (0, 1, 2) that are missing from the start.
+            angle_rad: the angle at 0 ns, rad: phase A is at its maximum where the angle is 0.
 
         Raises:
             ParameterError: a value outside its range.
@@ -146,7 +146,7 @@ class AcLine(Stateful):
         return self._voltage.value
 
     def angle(self, time_ns: float) -> float:
-        """Return the line's angle (rad) at an instant of the present segment; it is not folded into a turn."""
+        """Return the line's angle (rad) at an instant of the present segment, not reduced to one turn."""
         return self.start_angle + self.omega * ((time_ns - self.start_ns) * 1e-9)
 
     def phase_voltage(self, phase: int, time_ns: float) -> float:
@@ -154,38 +154,38 @@ class AcLine(Stateful):
         return self.amplitude_v * cos(self.angle(time_ns) + self.shift[phase])
 
     def instant_of(self, angle_rad: float, after_ns: int) -> int:
-        """Return the first instant at or after ``after_ns`` (ns) at which the line has an angle, if it runs on."""
+        """Return the first instant at or after ``after_ns`` (ns) at which the line has an angle, if nothing changes."""
         ahead = fmod(angle_rad - self.angle(after_ns), 2 * pi)
         if ahead < -1e-9:
             ahead += 2 * pi
         return after_ns + max(0, round(ahead / self.omega * 1e9))
 
     def step_frequency(self, at_ns: int, frequency_hz: float) -> None:
-        """Let the frequency be another from an instant on; the angle stays continuous."""
+        """Change the frequency at an instant; the angle stays continuous."""
         self._schedule(at_ns, ("frequency", _frequency(frequency_hz), 0.0, 0.0))
 
     def drift_frequency(self, at_ns: int, frequency_hz: float, rate_hz_s: float) -> None:
-        """Let the frequency move to another at a rate above 0 (Hz/s)."""
+        """Ramp the frequency to another from an instant on, at a rate above 0 (Hz/s)."""
         require("rate of the frequency in Hz/s", rate_hz_s, 0.0, above=True)
         self._schedule(at_ns, ("frequency", _frequency(frequency_hz), rate_hz_s, 0.0))
 
     def settle_frequency(self, at_ns: int, frequency_hz: float, tau_s: float) -> None:
-        """Let the frequency approach another with a time constant above 0 (s)."""
+        """Settle the frequency to another from an instant on, with a time constant above 0 (s)."""
         require("time constant in s", tau_s, 0.0, above=True)
         self._schedule(at_ns, ("frequency", _frequency(frequency_hz), 0.0, tau_s))
 
     def step_voltage(self, at_ns: int, v_ll_v: float) -> None:
-        """Let the line-to-line voltage (V rms) be another from an instant on."""
+        """Change the line-to-line voltage (V rms) at an instant."""
         self._schedule(at_ns, ("voltage", _voltage(v_ll_v), 0.0, 0.0))
 
     def settle_voltage(self, at_ns: int, v_ll_v: float, tau_s: float) -> None:
-        """Let the line-to-line voltage (V rms) approach another with a time constant above 0 (s)."""
+        """Settle the line-to-line voltage (V rms) to another from an instant on, with a time constant above 0 (s)."""
         require("time constant in s", tau_s, 0.0, above=True)
         self._schedule(at_ns, ("voltage", _voltage(v_ll_v), 0.0, tau_s))
 
     @property
     def is_moving(self) -> bool:
-        """Whether voltage or frequency move, or a change is to come."""
+        """Whether voltage or frequency is changing, or a change is pending."""
         return self._frequency.moving or self._voltage.moving or bool(self._pending)
 
     def generator_transient(
@@ -199,16 +199,16 @@ class AcLine(Stateful):
         volts: float | None = None,
         hertz: float | None = None,
     ) -> None:
-        """Imitate a generator that takes a load: voltage and frequency sag with one time constant, then recover.
+        """Imitate a load step on a generator: voltage and frequency sag with one time constant, then recover.
 
         Args:
-            at_ns: when the load comes, ns.
+            at_ns: instant of the load step, ns.
             dip: the part of the voltage that is lost, 0 to below 1.
-            frequency_dip_hz: how far the frequency sags, Hz.
+            frequency_dip_hz: the sag of the frequency, Hz.
             fall_s: time constant of the sag, s; the recovery begins after three of them (decision).
             recovery_s: time constant of the recovery, s.
-            volts: the voltage from which it sags and to which it recovers, V rms; None for where it is going.
-            hertz: the same of the frequency, Hz.
+            volts: the voltage from which it sags and to which it recovers, V rms; None for its present target.
+            hertz: the same for the frequency, Hz.
         """
         require("dip of the voltage", dip, 0.0, 0.99)
         volts = self._voltage.target if volts is None else volts
@@ -220,12 +220,12 @@ class AcLine(Stateful):
         self.settle_frequency(turn_ns, hertz, recovery_s)
 
     def cancel(self, what: str) -> None:
-        """Take back the changes of ``frequency`` or ``voltage`` that were posted and have not begun."""
+        """Cancel the posted changes of ``frequency`` or ``voltage`` that have not begun."""
         self._pending = [change for change in self._pending if change[2] != what]
         heapq.heapify(self._pending)
 
     def lose_phase(self, at_ns: int, phase: int) -> None:
-        """Open a phase (0, 1, 2) of the line at an instant; current that flows ends as the circuit decides."""
+        """Open a phase (0, 1, 2) of the line at an instant; the circuit determines how its current ends."""
         self._schedule(at_ns, ("lose", _phase(phase), 0.0, 0.0))
 
     def restore_phase(self, at_ns: int, phase: int) -> None:
@@ -233,7 +233,7 @@ class AcLine(Stateful):
         self._schedule(at_ns, ("restore", _phase(phase), 0.0, 0.0))
 
     def advance(self, time_ns: int) -> None:
-        """Let time pass to an instant that is not beyond ``next_change_ns``, and begin a segment there."""
+        """Advance to an instant that is not beyond ``next_change_ns``, and begin a segment there."""
         passed_s = (time_ns - self.start_ns) * 1e-9
         self.start_angle = fmod(self.start_angle + self.omega * passed_s, 2 * pi)
         self.start_ns = time_ns
@@ -260,12 +260,12 @@ class AcLine(Stateful):
         self.amplitude_v = sqrt(2 / 3) * (volts.mean(time_s) if volts.moving else volts.value)
 
     def state(self) -> SavedState:
-        """Return the angle, the changes to come, which phases are missing, and how voltage and frequency move."""
+        """Return the angle, the pending changes, the missing phases, and the courses of voltage and frequency."""
         courses = {"frequency": self._frequency.state(), "voltage": self._voltage.state()}
         return super().state() | courses | {"missing": sorted(self.missing)}
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over.
+        """Restore a state.
 
         Raises:
             ParameterError: it is not the state of a line.
@@ -294,7 +294,7 @@ class AcLine(Stateful):
         self.next_change_ns = min(self.next_change_ns, at_ns)
 
     def unit_wave(self, phase: int) -> tuple[float, float]:
-        """Return the factors of cos and sin of the line's angle that make a phase's voltage per volt of amplitude."""
+        """Return a phase's voltage per volt of amplitude as factors of cos and sin of the line's angle."""
         return cos(self.shift[phase]), -sin(self.shift[phase])
 
 

@@ -1,4 +1,4 @@
-"""The bridge's gates, latches and failures: what may conduct, what conducts, what is broken."""
+"""The bridge's gates, latches and failures: which SCRs may conduct, conduct, or are broken."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from automax_ros.drive.circuit.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask
 from automax_ros.drive.circuit.wiring import Wiring
 
 REST_NS: Final = 10
-"""How long an SCR that went out stays off, gated or not, ns (decision: keeps events from piling up at one instant)."""
+"""Time for which an extinguished SCR stays off, gated or not, ns (decision: keeps events from piling up at one
+instant)."""
 UNLATCHED_NS: Final = 100_000
-"""How long it stays off if it had conducted for less than ``REST_NS``, ns (decision: it did not latch)."""
+"""Time for which it stays off if it had conducted for less than ``REST_NS``, ns (decision: it did not latch)."""
 
 
 class Bridge(Stateful):
@@ -29,7 +30,7 @@ class Bridge(Stateful):
     _kept = ("pending", "gated", "gate_end_ns", "recovering", "on_ns", "recovered_ns", "rest_ns", "open_gates")
 
     def __init__(self, *, reversing: bool = True, turn_off_s: float = 150e-6, drop_v: float = 0.0) -> None:
-        """Begin with all SCRs off and sound.
+        """Create the bridge with all SCRs off and sound.
 
         Args:
             reversing: whether there is a bridge 2.
@@ -44,22 +45,22 @@ class Bridge(Stateful):
         self.drop_v = require("SCR drop in V", drop_v, 0.0, 10.0)
         self.wiring = Wiring()
         self.pending: list[tuple[int, int, int]] = []
-        """Gate windows to come: start (ns), end (ns), mask; a heap."""
+        """Pending gate windows: start (ns), end (ns), mask; a heap."""
         self.gated = 0
-        """SCRs whose gate window has begun and was not seen to end."""
+        """SCRs whose gate window has begun and is not yet known to have ended."""
         self.gate_end_ns = [0] * 12
         self.recovering = 0
-        """SCRs that went out and were not seen to recover."""
+        """SCRs that were extinguished and are not yet known to have recovered."""
         self.on_ns = [0.0] * 12
-        """When each SCR last turned on."""
+        """Instant at which each SCR last turned on."""
         self.recovered_ns = [0.0] * 12
-        """When each that went out blocks forward voltage again."""
+        """Instant at which each extinguished SCR blocks forward voltage again."""
         self.rest_ns = [0.0] * 12
-        """Until when each that went out cannot turn on."""
+        """Instant until which each extinguished SCR cannot turn on."""
         self.open_gates = 0
 
     def fire(self, on_ns: int, off_ns: int, numbers: Iterable[int]) -> None:
-        """Gate SCRs from one instant to another, ns; a later window of the same SCR replaces what is left of this.
+        """Gate SCRs from one instant to another, ns; a later window of the same SCR replaces the rest of this one.
 
         Raises:
             GateError: no such SCR, or the window is empty.
@@ -79,17 +80,17 @@ class Bridge(Stateful):
         heappush(self.pending, (on_ns, off_ns, mask))
 
     def cancel(self, now_ns: int) -> None:
-        """Take back every gate window, begun or to come, as when pulses are suppressed; what conducts stays on."""
+        """Cancel every gate window, begun or pending, as when pulses are suppressed; conducting SCRs stay on."""
         self.pending.clear()
         self.gated = 0
         self.gate_end_ns = [min(end, now_ns) for end in self.gate_end_ns]
 
     def take_back(self) -> None:
-        """Take back the gate windows that have not begun."""
+        """Cancel the gate windows that have not begun."""
         self.pending.clear()
 
     def begin_gates(self, now_ns: int) -> int:
-        """Begin every window that is due; returns the mask of fired SCRs whose gate lead is open."""
+        """Begin every window that is due; return the mask of fired SCRs whose gate lead is open."""
         lost = 0
         pending, ends = self.pending, self.gate_end_ns
         while pending and pending[0][0] <= now_ns:
@@ -127,7 +128,7 @@ class Bridge(Stateful):
         return mask
 
     def window_end_ns(self, mask: int, now_ns: float) -> float:
-        """Return how long all SCRs of a mask stay candidates, ns."""
+        """Return the instant until which all SCRs of a mask stay candidates, ns."""
         end = inf
         while mask:
             low = mask & -mask
@@ -140,7 +141,7 @@ class Bridge(Stateful):
         return end
 
     def rest_end_ns(self, mask: int) -> float:
-        """Return when the last SCR of a mask may conduct again after it went out, ns."""
+        """Return the instant from which every extinguished SCR of a mask may conduct again, ns."""
         bits = (bit for bit in range(12) if mask & self.recovering & 1 << bit)
         return max((self.rest_ns[bit] for bit in bits), default=0.0)
 
@@ -149,7 +150,7 @@ class Bridge(Stateful):
         return tuple(n for n in numbers_of(self.gated) if self.gate_end_ns[BIT[n]] > now_ns)
 
     def put_out(self, mask: int, now_ns: float) -> None:
-        """Note that SCRs went out."""
+        """Record that SCRs were extinguished."""
         self.recovering |= mask
         while mask:
             low = mask & -mask
@@ -159,14 +160,14 @@ class Bridge(Stateful):
             self.rest_ns[bit] = now_ns + (REST_NS if now_ns - self.on_ns[bit] >= REST_NS else UNLATCHED_NS)
 
     def open_gate(self, number: int, *, is_open: bool = True) -> None:
-        """Break (or mend) the gate lead of an SCR."""
+        """Open (or repair) the gate lead of an SCR."""
         mask = mask_of([number])
         self.open_gates = self.open_gates | mask if is_open else self.open_gates & ~mask
         if is_open:
             self.gated &= ~mask
 
     def short(self, number: int, *, shorted: bool = True) -> None:
-        """Short an SCR, and with it its partner (or put a sound one in)."""
+        """Short an SCR, and with it its partner (or replace it by a sound one)."""
         mask_of([number])
         leg = 1 << BIT[number] // 2
         old = self.wiring.shorted
@@ -180,7 +181,7 @@ class Bridge(Stateful):
         return super().state() | {"wiring": wiring}
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over.
+        """Restore a state.
 
         Raises:
             ParameterError: it is not the state of a bridge.

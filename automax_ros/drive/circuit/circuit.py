@@ -1,7 +1,7 @@
 """The power circuit: line, bridge and machine, advanced from event to event.
 
 Between events every current is known in closed form (``network``, ``waves``, ``conduction``). Gates and line changes
-lie on integer nanoseconds, the instants of extinction and commutation are not rounded.
+are at integer nanoseconds; the instants of extinction and commutation are not rounded.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Circuit(Conduction):
     Attributes:
         now_ns: the present, ns.
         current_a: armature current, A; positive out of rail P, from bridge 1.
-        energy: the energy meter, None unless asked for (it triples the time an interval takes).
+        energy: the energy meter, None unless requested (it triples the computing time of an interval).
     """
 
     def __init__(
@@ -48,12 +48,12 @@ class Circuit(Conduction):
         arc_v: float = ARC_V,
         step_ns: int = 0,
     ) -> None:
-        """Begin at the line's start without current.
+        """Create the circuit at the line's start without current.
 
         Args:
             line: the AC line, of this circuit alone.
             bridge: the SCRs.
-            machine: what they feed.
+            machine: the load.
             trace: whether turn-on, extinction and commutation are events too.
             energy: whether to meter energies.
             arc_v: voltage with which an opening contactor or fuse drives its current to zero, V.
@@ -64,7 +64,7 @@ class Circuit(Conduction):
         self._step_ns = step_ns
 
     def begin_with(self, numbers: Iterable[int], current_a: float) -> None:
-        """Begin with two SCRs that conduct an armature current (A), of the sign that they carry.
+        """Start with two SCRs that conduct an armature current (A), of the sign that they carry.
 
         Raises:
             ParameterError: these SCRs cannot carry it.
@@ -77,7 +77,7 @@ class Circuit(Conduction):
         share = net.share
         self._enter(net.mask, (share[0] * current_a, share[1] * current_a, share[2] * current_a), 0.0, 1.0)
 
-    # What a controller does
+    # Control
 
     def fire(self, on_ns: int, off_ns: int, *numbers: int) -> None:
         """Gate SCRs, given by their numbers, from one instant to another (ns).
@@ -98,10 +98,10 @@ class Circuit(Conduction):
         self.bridge.fire_mask(on_ns, off_ns, mask)
 
     def advance(self, until_ns: int) -> None:
-        """Let time pass to an instant (ns); gates and changes that begin exactly then wait for the next call.
+        """Advance to an instant (ns); gates and changes that begin exactly then wait for the next call.
 
         Raises:
-            ParameterError: the instant lies in the past.
+            ParameterError: the instant is in the past.
             SourceShortError: two phases are shorted and the line has no impedance.
         """
         if until_ns < self.now_ns:
@@ -131,29 +131,29 @@ class Circuit(Conduction):
             self._run(stop)
 
     def sample(self) -> Sample:
-        """Return the integrals since the last call (or the start), and begin again."""
+        """Return the integrals since the last call (or the start), and restart them."""
         sample = self.present_sample()
         self._begin_sample()
         return sample
 
     def present_sample(self) -> Sample:
-        """Return the integrals since the last sample, which goes on; its list of intervals is the circuit's own."""
+        """Return the integrals since the last sample without ending it; the list of intervals is the circuit's own."""
         volt_s = self._volt_s + self._z.r * self._charge + self._z.l * (self.current_a - self._current_before)
         duration_s = (self.now_ns - self._sample_ns) * 1e-9
         charge, zero_s, overlap_s = self._charge, self._zero_s, self._overlap_s
         return Sample(duration_s, charge, volt_s, zero_s, overlap_s, self._square, self._pieces, self._highest)
 
     def pieces(self) -> list[WavePiece]:
-        """Return the armature current since the last sample, interval by interval, without those where none flowed."""
+        """Return the armature current since the last sample by intervals, without those in which none flowed."""
         return self._pieces[:]
 
     def take_events(self) -> list[CircuitEvent]:
-        """Return what happened since the last call; the last 10,000 are kept, ``events_lost`` counts the others."""
+        """Return the events since the last call; the last 10,000 are kept, ``events_lost`` counts the others."""
         events = [CircuitEvent(*raw) for raw in self._events]
         self._events.clear()
         return events
 
-    # What can be seen at this instant
+    # Present values
 
     @property
     def conducting(self) -> tuple[int, ...]:
@@ -167,7 +167,7 @@ class Circuit(Conduction):
 
     @property
     def idle_s(self) -> float:
-        """How long no armature current has flowed up to now, s; 0 while it flows."""
+        """Time since armature current last flowed, s; 0 while it flows."""
         return 0.0 if self._net.active else (self.now_ns - self._ended_ns) * 1e-9
 
     @property
@@ -200,10 +200,10 @@ class Circuit(Conduction):
             return max(map(abs, self.phase_currents()))
         return net.largest_share * abs(self.current_a) if net.active else 0.0
 
-    # What can break
+    # Faults
 
     def short_scr(self, number: int, *, shorted: bool = True) -> None:
-        """Let an SCR fail into a short both ways, or put a sound one in, which carries on with the current there is."""
+        """Short an SCR in both directions, or replace it by a sound one, which takes over the present current."""
         phases = self.phase_currents()
         left_on = 0
         if shorted:
@@ -217,11 +217,11 @@ class Circuit(Conduction):
         self._rewire(phases, left_on)
 
     def open_gate(self, number: int, *, is_open: bool = True) -> None:
-        """Break (or mend) the gate lead of an SCR; each time it should fire is an event."""
+        """Open (or repair) the gate lead of an SCR; each time it should fire is an event."""
         self.bridge.open_gate(number, is_open=is_open)
 
     def open_phase(self, phase: int) -> None:
-        """Open a phase (0 to 2) by fuse or upstream; an arc drives its current to zero first."""
+        """Open a phase (0 to 2), as by a fuse or upstream; an arc drives its current to zero first."""
         wiring = self.bridge.wiring
         if wiring.open_phases >> phase & 1 or wiring.phase_arc_v[phase]:
             return
@@ -260,12 +260,12 @@ class Circuit(Conduction):
         self._emit(EventKind.ARMATURE_CLOSED, 0.0, 0)
         self._rewire(phases)
 
-    # What can be kept
+    # State
 
     def state(self) -> SavedState:
         """Return all that the future depends on, with line, bridge and machine: plain data that JSON keeps exactly.
 
-        What has not been taken yet of events and of the present sample is in it too.
+        Events and the part of the present sample that have not been fetched are included.
         """
         return super().state() | {
             "line": self.line.state(),
@@ -275,12 +275,12 @@ class Circuit(Conduction):
             "_pieces": [piece.numbers() for piece in self._pieces],
             "events": [(kind.value, *rest) for kind, *rest in self._events],
             "conducting": self._net.mask,
-            # The order in which currents are looked at decides the last bits of an instant that several share.
+            # The order in which currents are checked determines the last bits of an instant that several share.
             "guards": [[net.mask, [guard[0] for guard in net.guards]] for net in self._built()],
         }
 
     def restore(self, state: SavedState) -> None:
-        """Take over the state of a circuit that was made alike, and go on from there, bit for bit.
+        """Restore the state of a circuit created from the same data, and continue from there, bit for bit.
 
         Raises:
             ParameterError: it is not the state of such a circuit.
@@ -305,11 +305,11 @@ class Circuit(Conduction):
         self._net = self._network(state["conducting"])
 
     def _built(self) -> list[Network]:
-        """Return the networks at hand, with the one in force, by their masks."""
+        """Return the cached networks, including the one in force, one per mask."""
         found = {net.mask: net for net in [*self._nets.values(), self._net]}
         return [found[mask] for mask in sorted(found)]
 
-    # What comes from outside
+    # Changes from outside
 
     def _change_line(self, now_ns: int) -> None:
         """Begin the line's next segment."""
@@ -327,7 +327,7 @@ class Circuit(Conduction):
                 self.close_phase(phase)
 
     def _rewire(self, phases: Phases, left_on: int = 0) -> None:
-        """Take over what changed in the wiring or the line, with the phase currents (A) just before."""
+        """Apply a change of the wiring or the line, given the phase currents (A) just before."""
         old = self._net
         self._nets.clear()
         angle = self.line.angle(self.now_ns)

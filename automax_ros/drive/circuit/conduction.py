@@ -1,4 +1,4 @@
-"""How a power circuit passes time: from event to event, each interval in closed form.
+"""Advances a power circuit from event to event, each interval in closed form.
 
 Root finding serves only to find the instant of an event: a current that ends, a gated SCR that gets forward voltage.
 """
@@ -34,7 +34,7 @@ _ALARMS: Final = (
 
 
 class Conduction(Stateful):
-    """Line, bridge and machine while neither gates nor line nor wiring change; ``circuit.Circuit`` is the whole."""
+    """Line, bridge and machine while gates, line and wiring do not change; ``circuit.Circuit`` extends it."""
 
     _kept = (
         "now_ns", "current_a", "events_lost", "_modes", "_newest", "_emf", "_sample_ns", "_current_before", "_charge",
@@ -42,7 +42,7 @@ class Conduction(Stateful):
     )  # fmt: skip
 
     def __init__(self, line: AcLine, bridge: Bridge, machine: Machine, *, trace: bool, energy: bool) -> None:
-        """Begin at the line's start without current; see ``Circuit``."""
+        """Create the circuit at the line's start without current; see ``Circuit``."""
         self.line = line
         self.bridge = bridge
         self.machine = machine
@@ -69,7 +69,7 @@ class Conduction(Stateful):
         self._pieces: list[WavePiece] = []
 
     def _run(self, stop_ns: int) -> None:
-        """Let time pass to an instant before which no gate begins and the line stays as it is."""
+        """Advance to an instant before which no gate begins and the line does not change."""
         line, bridge, machine = self.line, self.bridge, self.machine
         start_ns, omega = self.now_ns, line.omega
         total = (stop_ns - start_ns) * 1e-9
@@ -101,7 +101,7 @@ class Conduction(Stateful):
                 end = theta + omega * first
                 end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
                 after = c * end_cosine + d * end_sine + k + a * fall
-                # How far the current can leave the straight line from one end to the other.
+                # Largest deviation of the current from the straight line between both ends.
                 sag = 0.125 * (net.bend + decay * decay * (a if a >= 0.0 else -a)) * first * first
                 if sign and (sign * current <= sag or sign * after <= sag):
                     first, out = next_ending(net, omega, (theta, sine, cosine, k, a), modes, first)
@@ -135,7 +135,7 @@ class Conduction(Stateful):
         self._finish(stop_ns, total, charge, current - began_a)
 
     def _fade(self, modes: Phases, interval: tuple[float, float, float, float]) -> Phases:
-        """Count an interval (angle at its start, duration, k and a) and return what is left of the source's modes."""
+        """Count an interval (angle at its start, duration, k and a) and return the decayed modes of the source."""
         net, duration = self._net, interval[1]
         if self.energy is not None:
             self.energy.add(net, self.line, self._z, self.bridge.wiring, self._emf, interval, modes)
@@ -147,7 +147,7 @@ class Conduction(Stateful):
         return modes
 
     def _finish(self, stop_ns: int, total: float, charge: float, change_a: float) -> None:
-        """Count what a run brought and let the machine turn."""
+        """Add the integrals of a run and advance the machine."""
         self.now_ns = stop_ns
         self._charge += charge
         self._volt_s += self._emf * total
@@ -163,7 +163,7 @@ class Conduction(Stateful):
             self.energy.stored_j = 0.5 * (self._z.l * self.current_a**2 + self._z.ls * squares)
 
     def _switch(self, out: int, on: int, start_ns: int, t: float, sine: float, cosine: float) -> Network:
-        """Let SCRs go out (or arcs end), or turn on, at an instant; return the circuit from then on."""
+        """Extinguish SCRs (or arcs), or turn SCRs on, at an instant; return the circuit from then on."""
         old = self._net
         now_ns = start_ns + t * 1e9
         if on:
@@ -188,7 +188,7 @@ class Conduction(Stateful):
         return net
 
     def _enter(self, mask: int, phases: Phases, sine: float, cosine: float) -> Network:
-        """Make a set of SCRs conduct from the present, with the phase currents (A) just before."""
+        """Make a set of SCRs conduct from the present on, given the phase currents (A) just before."""
         net = self._nets.get(mask) or self._network(mask)
         if net.instant or net.arcing:
             net, phases = self._clear_up(net, phases, sine, cosine)
@@ -198,14 +198,14 @@ class Conduction(Stateful):
         return net
 
     def _take(self, net: Network) -> None:
-        """Go on with a circuit, without modes of the source so far."""
+        """Continue with a circuit, with the modes of the source at 0."""
         if not net.active:
             self.current_a = 0.0
         self._modes = (0.0, 0.0, 0.0)
         self._net = net
 
     def _clear_up(self, net: Network, phases: Phases, sine: float, cosine: float) -> tuple[Network, Phases]:
-        """Commutate what has no source impedance, open arcs without current; return the circuit and phase currents."""
+        """Commutate phases without source impedance, open arcs without current; return circuit and phase currents."""
         while True:
             wiring = self.bridge.wiring
             if wiring.armature_arc_v and not net.active:
@@ -221,7 +221,7 @@ class Conduction(Stateful):
                 return net, phases
 
     def _commutate_at_once(self, net: Network, phases: Phases, sine: float, cosine: float) -> tuple[Network, Phases]:
-        """Let one SCR go out of phases tied without impedance: the first whose current is driven to zero."""
+        """Extinguish one SCR of phases tied without impedance: the first whose current is driven to zero."""
         line = self.line
         push, over = [0.0] * 3, [0.0] * 3
         for group in net.rail_of_phases:
@@ -251,7 +251,7 @@ class Conduction(Stateful):
         return self._network(net.mask & ~gone), (moved[0], moved[1], moved[2])
 
     def _phases(self, net: Network, current: float, sine: float, cosine: float) -> Phases:
-        """Return the phase currents (A) at an armature current (A) and the line's angle."""
+        """Return the phase currents (A) at an armature current (A) and an angle of the line."""
         a, b, c = net.share
         a, b, c = a * current, b * current, c * current
         if not net.modes:
@@ -287,7 +287,7 @@ class Conduction(Stateful):
         self.bridge.wiring = wiring
         self._nets.clear()
 
-    # What is told
+    # Events
 
     def _note_turn_on(self, on: int, now_ns: float, t: float) -> None:
         bridge = self.bridge
@@ -330,9 +330,9 @@ class Conduction(Stateful):
 
 
 def _modes(net: Network, phases: Phases, sine: float, cosine: float) -> Phases:
-    """Return what the phases' currents (A) are over their common mean, which the armature takes, and the steady part.
+    """Return the phase currents (A) less their common mean, which flows through the armature, and the steady part.
 
-    Written out phase by phase: compiled, three numbers in a tuple are quick only where their places are known.
+    Written out phase by phase: compiled, numbers in a tuple are quick to read only at constant indexes.
     """
     by_c, by_d, const = net.phase_c, net.phase_d, net.phase_k
     a, b, c = phases

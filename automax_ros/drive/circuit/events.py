@@ -1,4 +1,4 @@
-"""What happens in a power circuit, as a list that the circuit hands out."""
+"""The events of a power circuit."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Final
 
 
 class EventKind(enum.Enum):
-    """What happened; ``number`` of an event is an SCR's, or a phase (0 to 2), or 0."""
+    """Kind of an event, whose ``number`` is that of an SCR or phase (0 to 2), or 0."""
 
     TURN_ON = "turn on"
     EXTINCTION = "extinction"
     COMMUTATION_START = "commutation start"
     COMMUTATION_END = "commutation end"
     COMMUTATION_FAILURE = "commutation failure"
-    """An SCR got forward voltage before it recovered, or the incoming one went out instead of the outgoing."""
+    """An SCR got forward voltage before it recovered, or the incoming one was extinguished instead of the outgoing."""
     ARMATURE_SHORT = "armature short"
     """A phase conducts to both rails: the armature is shorted."""
     LINE_SHORT = "line short"
@@ -24,29 +24,29 @@ class EventKind(enum.Enum):
     """SCRs of both bridges conduct."""
     SCR_SHORTED = "SCR shorted"
     GATE_OPEN = "gate open"
-    """A gate was to be fired whose lead is open."""
+    """An SCR was to be fired whose gate lead is open."""
     PHASE_OPEN = "phase open"
-    """A phase's current has ended, by a fuse or in the line."""
+    """A phase's current has been interrupted, by a fuse or in the line."""
     PHASE_CLOSED = "phase closed"
     ARMATURE_OPEN = "armature open"
-    """The contactor's current has ended."""
+    """The contactor has interrupted the armature current."""
     ARMATURE_CLOSED = "armature closed"
 
 
 ROUTINE: Final = frozenset(
     {EventKind.TURN_ON, EventKind.EXTINCTION, EventKind.COMMUTATION_START, EventKind.COMMUTATION_END}
 )
-"""What happens in every healthy cycle; told only on request."""
+"""Events of every healthy cycle; recorded only on request."""
 
 
 @dataclass(frozen=True)
 class CircuitEvent:
-    """One thing that happened.
+    """An event.
 
     Attributes:
-        kind: what.
+        kind: its kind.
         base_ns: an integer instant at or shortly before it, ns.
-        after_s: how long after ``base_ns`` it happened (s), not rounded.
+        after_s: time from ``base_ns`` to the event (s), not rounded.
         number: an SCR's number, or a phase.
         current_a: the armature current at that instant, A.
     """

@@ -1,4 +1,4 @@
-"""When SCRs are fired: natural commutation of each, and a controller that keeps alpha constant."""
+"""Firing instants of the SCRs: natural commutation, and a controller with a constant alpha."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from automax_ros.drive.circuit.scr import FORWARD, REVERSE, direction_of, phase_
 
 SIXTH: Final = pi / 3
 _MARGIN_NS: Final = 1000
-"""An instant of a natural commutation is looked for from this long before, lest rounding skip a turn."""
+"""The search for a natural commutation begins this long before the present, or rounding could skip a turn, ns."""
 
 
 def natural_angle(number: int, line: AcLine) -> float:
@@ -38,7 +38,7 @@ class ConstantAlpha(Stateful):
     """Fires each SCR at an angle after its natural commutation, and the one before it again (double pulse).
 
     Attributes:
-        alpha_rad: the angle, rad; a change counts from the next firing that is not yet posted.
+        alpha_rad: the angle, rad; a change applies from the next firing that is not yet posted.
         bridge: 1 or 2.
         pulse_rad: length of each of the two pulses, rad; 60 degrees keep a pair gated until the next is.
     """
@@ -46,7 +46,7 @@ class ConstantAlpha(Stateful):
     _kept = ("alpha_rad", "pulse_rad", "bridge", "_order", "_position", "_natural_ns")
 
     def __init__(self, circuit: Circuit, alpha_rad: float, *, bridge: int = 1, pulse_rad: float = SIXTH) -> None:
-        """Begin to fire at the circuit's present."""
+        """Create the controller, which fires from the circuit's present on."""
         self.circuit = circuit
         self.alpha_rad = require("alpha in rad", alpha_rad, 0.0, pi)
         self.pulse_rad = require("pulse length in rad", pulse_rad, 0.0, 2 * SIXTH, above=True)
@@ -54,7 +54,7 @@ class ConstantAlpha(Stateful):
         self.use_bridge(bridge)
 
     def use_bridge(self, bridge: int) -> None:
-        """Fire bridge 1 or 2 from now on; what was posted of the other stays."""
+        """Fire bridge 1 or 2 from now on; posted gates of the other remain."""
         if bridge == self.bridge:
             return
         line, now_ns = self.circuit.line, self.circuit.now_ns
@@ -65,19 +65,19 @@ class ConstantAlpha(Stateful):
         self._natural_ns = min(instants) - round(self.alpha_rad / line.omega * 1e9)
 
     def advance(self, until_ns: int) -> None:
-        """Let time pass to an instant (ns), firing on the way."""
+        """Advance the circuit to an instant (ns) and fire meanwhile."""
         while (on_ns := self._next_ns()) < until_ns:
             self.circuit.advance(on_ns)
             self._fire(on_ns)
         self.circuit.advance(until_ns)
 
     def post(self, until_ns: int) -> None:
-        """Post the gates until an instant (ns) without letting time pass: for a circuit whose coupling does that."""
+        """Post the gates until an instant (ns) without advancing the circuit, for one that its coupling advances."""
         while (on_ns := self._next_ns()) < until_ns:
             self._fire(on_ns)
 
     def _next_ns(self) -> int:
-        """Return the next firing, looked for again each time while it lies ahead: alpha and the line may have moved."""
+        """Return the instant of the next firing, computed on each call, since alpha and the line may have changed."""
         circuit, line = self.circuit, self.circuit.line
         natural = natural_angle(self._order[self._position], line)
         return max(line.instant_of(natural + self.alpha_rad, self._natural_ns - _MARGIN_NS), circuit.now_ns)

@@ -1,4 +1,4 @@
-"""What is measured over a time: the exact integrals that a controller samples, and where the energy went."""
+"""Measurements over a time: the exact integrals that a controller samples, and the energies."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _STEEPEST: Final = 3.0
 
 
 class Sample:
-    """Exact integrals since the sample before.
+    """Exact integrals since the previous sample.
 
     Attributes:
         duration_s: the time since then, s.
         charge_c: integral of the armature current, A s.
         volt_s: integral of the voltage over the armature's terminals, V s; the EMF counts while no current flows.
-        zero_current_s: how long no armature current flowed, s (DC_TIME).
-        overlap_s: how long a rail had two or three phases, s.
+        zero_current_s: time without armature current, s (DC_TIME).
+        overlap_s: time in which a rail had two or three phases, s.
     """
 
     __slots__ = ("_highest", "_pieces", "_square", "charge_c", "duration_s", "overlap_s", "volt_s", "zero_current_s")
@@ -44,7 +44,7 @@ class Sample:
         pieces: list[WavePiece],
         highest_a: float = inf,
     ) -> None:
-        """Take the integrals, and what the current's magnitude (A) has not passed, for all that was looked at."""
+        """Create the sample from the integrals and an upper bound of the current's magnitude (A)."""
         self.duration_s = duration_s
         self.charge_c = charge_c
         self.volt_s = volt_s
@@ -67,24 +67,24 @@ class Sample:
     def exceeds(self, level_a: float) -> bool:
         """Return whether the magnitude of the current was above a level (A) at some instant.
 
-        Only the last 64 intervals are looked at (those that the circuit keeps).
+        Only the last 64 intervals are checked (those that the circuit keeps).
         """
         if self._highest < level_a:
             return False
         conducting_s = self.duration_s - self.zero_current_s
-        # No pulse of a bridge is steeper than a triangle by more than this: most samples need no search.
+        # No pulse of a bridge has a larger ratio of peak to mean than this: most samples need no search.
         if conducting_s <= 0.0 or abs(self.charge_c) * _STEEPEST < level_a * conducting_s:
             return False
         return any(bound(piece) > level_a and max(map(abs, piece.extremes())) > level_a for piece in self._pieces)
 
     @property
     def rms_current_a(self) -> float:
-        """Root of the mean square of the armature current, A; computed when asked for."""
+        """Root mean square of the armature current, A; computed on demand."""
         return sqrt(max(self.square_a2s, 0.0) / self.duration_s) if self.duration_s else 0.0
 
     @property
     def square_a2s(self) -> float:
-        """Integral of the square of the armature current, A2 s; computed when asked for."""
+        """Integral of the square of the armature current, A2 s; computed on demand."""
         return self._square + add_up([piece.square() for piece in self._pieces])
 
 
@@ -97,8 +97,8 @@ class EnergyMeter(Stateful):
         resistance_j: lost in the armature's and the source's resistance.
         drop_j: lost in the drop of SCRs.
         arc_j: lost in arcs of opening phases and of the contactor.
-        emf_j: taken by the EMF, as the circuit sees it.
-        stored_j: in the inductances, over what was there at the start.
+        emf_j: delivered to the EMF, as the circuit computes it.
+        stored_j: in the inductances, above the value at the start.
     """
 
     source_j: float = 0.0
@@ -110,7 +110,7 @@ class EnergyMeter(Stateful):
 
     @property
     def loss_j(self) -> float:
-        """All that became heat, J."""
+        """The total heat, J."""
         return self.resistance_j + self.drop_j + self.arc_j
 
     def add(
@@ -128,9 +128,9 @@ class EnergyMeter(Stateful):
         Args:
             net: the circuit of the interval.
             line: the line in this segment.
-            z: its constants.
-            wiring: its faults.
-            emf_v: the EMF.
+            z: the circuit's constants.
+            wiring: the circuit's faults.
+            emf_v: the EMF, V.
             interval: angle of the line at the start, duration (s), k and a of the armature current.
             modes: decaying parts of the three phases' source modes at the start, A.
         """
@@ -171,7 +171,7 @@ class EnergyMeter(Stateful):
         offset_a, offset_b, offset_c = net.offsets
         arc_a, arc_b, arc_c = wiring.phase_arc_v
         for x in range(3):
-            # Written out: compiled, a tuple's numbers are quick to get only where their places are known.
+            # Written out: compiled, a tuple's numbers are quick to read only at constant indexes.
             if x == 0:
                 share, offset, arc_v = share_a, offset_a, arc_a
             elif x == 1:
@@ -189,7 +189,7 @@ class EnergyMeter(Stateful):
         self._count(heat, drop, charge, emf_v, wiring)
 
     def _count(self, heat: float, drop: float, charge: float, emf_v: float, wiring: Wiring) -> None:
-        """Count what a charge through the armature brings, and what was lost on its way, J."""
+        """Add the energies of a charge through the armature, given the heat and the loss in SCR drops, J."""
         self.arc_j += wiring.armature_arc_v * charge
         self.resistance_j += heat
         self.drop_j += drop

@@ -1,15 +1,15 @@
-"""The circuit that a set of closed legs makes: source, legs, armature, as decoupled first-order modes.
+"""The circuit of a set of closed legs: source, legs, armature, as decoupled first-order modes.
 
 Phase x obeys ``e_x - (Ls d/dt + Rs) i_x = v_x`` with all source impedances equal and an isolated neutral; the
-armature obeys ``(L d/dt + R) i + E = v_P - v_M``. Whatever set of legs is closed, this falls apart into
+armature obeys ``(L d/dt + R) i + E = v_P - v_M``. For every set of closed legs this separates into
 
 * one mode of the armature current with L + n Ls, R + n Rs, where n is 1/p + 1/m for p and m phases on the rails (2 for
   two SCRs, 1.5 while one commutates), or 0 where a phase on both rails shorts the armature;
 * modes of the currents that flow between the phases of one rail, less their equal share of the armature current: Ls,
   Rs.
 
-Each is solved in closed form (``waves``). SCRs are ideal but for a constant drop; where legs alone make a loop its
-current has no driving voltage, and the legs share as equal small resistances would.
+Each is solved in closed form (``waves``). SCRs are ideal apart from a constant drop. In a loop of legs alone no voltage
+drives the current, and the legs share it as equal small resistances would.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Potential = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True)
 class Impedances:
-    """The constants of the circuit, SI units; resistances not below what ``SLOWEST_DECAY`` allows."""
+    """The constants of the circuit, SI units; resistances are at least those that ``SLOWEST_DECAY`` allows."""
 
     ls: float
     rs: float
@@ -45,7 +45,7 @@ class Impedances:
 
     @staticmethod
     def of(line: AcLine, inductance_h: float, resistance_ohm: float, drop_v: float) -> Impedances:
-        """Take the source's from a line."""
+        """Return the constants, those of the source from a line."""
         ls = line.inductance_h
         rs = max(line.resistance_ohm, SLOWEST_DECAY * ls)
         return Impedances(ls, rs, inductance_h, max(resistance_ohm, SLOWEST_DECAY * inductance_h), drop_v)
@@ -54,7 +54,7 @@ class Impedances:
 Phases = tuple[float, float, float]
 """A value of each of the line's phases."""
 Guard = tuple[int, float, float, float, float, float, float, float, float]
-"""A current that must stay positive: SCRs it flows through (mask), factors of cos and sin, share of the armature
+"""A current that must stay positive: the SCRs that carry it (mask), factors of cos and sin, share of the armature
 current, constant, shares of the three phases' source modes, curvature omega^2 hypot(c, d)."""
 
 
@@ -66,7 +66,7 @@ _Current = tuple[float, float, float, float, float, float, float]
 
 
 class Network:
-    """The equations of one set of closed legs, as numbers for ``circuit``; built once for a set and a line segment."""
+    """The equations of one set of closed legs as numbers for ``circuit``; built once for a set and a line segment."""
 
     __slots__ = (
         "_drop_v", "_omega", "active", "alarms", "arcing", "armature_short", "bend", "c", "calm", "constant", "d",
@@ -89,7 +89,7 @@ class Network:
         self._set_guards(legs, wiring, line.omega)
         self.arcing = wiring.arcing
         self.calm = not (self.modes or self.instant or self.arcing)
-        """Whether it is entered with nothing but the armature's current."""
+        """Whether the armature's current alone is needed to enter it."""
         self.alarms = ARMATURE_SHORT if self.armature_short else 0
         if any(is_line_short(rail, legs) for rail in (P, M)):
             self.alarms |= LINE_SHORT
@@ -97,7 +97,7 @@ class Network:
             self.alarms |= CROSS_FIRE
 
     def _group(self, legs: dict[int, int], drops: dict[int, float], wiring: Wiring) -> None:
-        """Find which phases are tied together, their shares of the armature current and their voltage offsets."""
+        """Find the phases that are tied together, their shares of the armature current and their voltage offsets."""
         at_p = [x for x in range(3) if 2 * x in legs]
         at_m = [x for x in range(3) if 2 * x + 1 in legs]
         both = [x for x in at_p if x in at_m]
@@ -132,7 +132,7 @@ class Network:
         self.largest_share = max(map(abs, self.share))
         self.rail_of_phases = groups
         self.tied = [(g[0], g[1], g[2] if len(g) > 2 else -1) for g in groups if len(g) > 1]
-        """Phases on one rail, -1 where there are but two."""
+        """Phases on one rail; the third is -1 where there are only two."""
         self.modes = bool(self.tied)
 
     def _solve_armature(self, wiring: Wiring, line: AcLine, z: Impedances) -> None:
@@ -181,7 +181,7 @@ class Network:
     def _set_potentials(
         self, legs: dict[int, int], drops: dict[int, float], wiring: Wiring, line: AcLine, z: Impedances
     ) -> None:
-        """Set the potentials of phases (0 to 2) and rails P, M (3, 4) against the neutral; None where they float."""
+        """Set the potentials of phases (0 to 2) and rails P, M (3, 4) to the neutral; None where they float."""
         impeded = (
             z.rs * self.c + z.ls * line.omega * self.d,
             z.rs * self.d - z.ls * line.omega * self.c,
@@ -244,10 +244,10 @@ class Network:
         alone = len(guards) == 1 and self.active and not self.modes
         only = self.guards[0] if alone else None
         self.sign = only[3] if only and abs(only[3]) == 1.0 and only[4] == 0.0 else 0.0
-        """1 or -1 where the armature current, times this, is all that must stay positive; else 0."""
+        """1 or -1 where the armature current times this is the only current that must stay positive, else 0."""
 
     def _guard(self, armature: float, a: float, b: float, c: float) -> _Current:
-        """Return the factors of a sum of the armature current and the phase currents with weights."""
+        """Return the factors of a weighted sum of the armature current and the phase currents."""
         weights = (a, b, c)
         share = armature + add_up([w * part for w, part in zip(weights, self.share, strict=True)])
         if not self.active:
@@ -261,23 +261,23 @@ class Network:
         return share * self.c + cosine, share * self.d + sine, share, constant, a, b, c
 
     def leg_current(self, leg: int, armature_a: float, phases_a: tuple[float, float, float]) -> float:
-        """Return the current of a leg from its phase to its rail, A; 0 of an open one."""
+        """Return the current of a leg from its phase to its rail, A; 0 for an open one."""
         armature, a, b, c = self.leg_weights.get(leg, (0.0, 0.0, 0.0, 0.0))
         return armature * armature_a + a * phases_a[0] + b * phases_a[1] + c * phases_a[2]
 
     def put_first(self, mask: int) -> None:
-        """Let the current of these SCRs be looked at first: what ended this circuit last time will next time too."""
+        """Check the current of these SCRs first: the one that ended this circuit last time will do so next time too."""
         self.guards.sort(key=lambda guard: guard[0] != mask)
 
     def put_in_order(self, masks: list[int]) -> None:
-        """Let the currents be looked at in the order of these SCRs."""
+        """Check the currents in the order of these SCRs."""
         place = {mask: index for index, mask in enumerate(masks)}
         self.guards.sort(key=lambda guard: place.get(guard[0], len(place)))
 
     def watch(self, wanted: int) -> list[Watch]:
-        """Return, for SCRs that could begin to conduct, the voltages over them: of single ones, of pairs in series.
+        """Return the voltages over SCRs that could begin to conduct: over single ones, and over pairs in series.
 
-        A pair joins where one SCR alone has no way for its current: on floating rails or an open phase.
+        A pair turns on together where one SCR alone has no path for its current: on floating rails or an open phase.
         """
         found = self.watches.get(wanted)
         if found is None:
@@ -296,7 +296,7 @@ ARMATURE_SHORT: Final = 1
 LINE_SHORT: Final = 2
 CROSS_FIRE: Final = 4
 """Bits of ``Network.alarms``."""
-# Not Final: mypyc 2.4 takes a Final tuple of floats for one that was never set.
+# Not Final: mypyc 2.4 treats a Final tuple of floats as never set.
 _NOTHING: Potential = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _UNIT: Potential = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _EMF: Potential = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -315,13 +315,13 @@ def _combined(one: Potential, two: Potential, factor: float) -> Potential:
 
 
 def _response(cosine: float, sine: float, r: float, x: float) -> tuple[float, float]:
-    """Return the current of ``cosine cos + sine sin`` volts in r and x (ohm) once it has settled."""
+    """Return the steady-state current of ``cosine cos + sine sin`` volts in r and x (ohm)."""
     square = r * r + x * x
     return (r * cosine - x * sine) / square, (r * sine + x * cosine) / square
 
 
 def _watch(nodes: list[Potential | None], floating: Potential | None, wanted: int) -> list[tuple[int, Potential]]:
-    """Return what ``Network.watch`` returns; ``floating`` is the voltage from P to M where both rails float."""
+    """Return the voltages for ``Network.watch``; ``floating`` is the voltage from P to M where both rails float."""
     found = []
     ways = []
     for bit in range(12):
@@ -344,7 +344,7 @@ def _watch(nodes: list[Potential | None], floating: Potential | None, wanted: in
 def _series(
     nodes: list[Potential | None], floating: Potential | None, start: int, entry: int, leave: int, end: int
 ) -> Potential | None:
-    """Return the voltage of a way from ``start`` over the floating ``entry`` and ``leave`` to ``end``, if it is one."""
+    """Return the voltage of the path from ``start`` by floating ``entry`` and ``leave`` to ``end``, if it is one."""
     one, two = nodes[start], nodes[end]
     if start == end and entry != leave:
         way: Potential = _NOTHING

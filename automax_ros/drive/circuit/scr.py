@@ -1,10 +1,10 @@
-"""The twelve SCRs: numbers, places, directions (the one table that says which SCR sits where).
+"""The twelve SCRs: the one table of their numbers, places and directions.
 
-The anti-parallel pairs 1-14, 2-15, 3-16, 4-11, 5-12, 6-13 are the manual's (52.3.1). Which phase a pair sits on is
-not told by any manual; here it follows from firing in the order 1-2-3-4-5-6 on a line that rotates A, B, C (decision).
+The anti-parallel pairs 1-14, 2-15, 3-16, 4-11, 5-12, 6-13 are the manual's (52.3.1). No manual says which phase a pair
+is on; here it follows from firing in the order 1-2-3-4-5-6 on a line that rotates A, B, C (decision).
 
-Inside, an SCR is a bit: ``2 * leg`` for the one that conducts from the phase to the rail, the next for its partner. A
-leg is a place for a pair, ``2 * phase + rail``: phases A, B, C are 0, 1, 2, the rails P (armature A1) and M (A2) are
+Internally, an SCR is a bit: ``2 * leg`` for the one that conducts from the phase to the rail, the next for its partner.
+A leg is a place for a pair, ``2 * phase + rail``: phases A, B, C are 0, 1, 2, the rails P (armature A1) and M (A2) are
 0, 1.
 """
 
@@ -25,7 +25,7 @@ FORWARD: Final = (1, 2, 3, 4, 5, 6)
 REVERSE: Final = (11, 12, 13, 14, 15, 16)
 """The SCRs of bridge 2, likewise; they carry negative armature current."""
 
-# number: phase, rail, direction (+1 conducts from the phase to the rail)
+# number: phase, rail, direction (+1: conducts from the phase to the rail)
 _PLACES: Final = {
     1: (0, P, 1), 3: (1, P, 1), 5: (2, P, 1),
     4: (0, M, -1), 6: (1, M, -1), 2: (2, M, -1),
@@ -64,10 +64,10 @@ def direction_of(number: int) -> int:
 
 
 def mask_of(numbers: Iterable[int]) -> int:
-    """Return the bits of SCRs.
+    """Return the mask of SCRs.
 
     Raises:
-        GateError: there is no SCR of that number.
+        GateError: there is no SCR of a number.
     """
     return _mask_of(tuple(numbers))
 

@@ -1,4 +1,4 @@
-"""Which event ends an interval: the first current that falls to zero, the first SCR that forward voltage turns on."""
+"""Finds the event that ends an interval: the first current that falls to zero, the first SCR that turns on."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from automax_ros.drive.circuit.network import Network, Phases
 from automax_ros.drive.circuit.waves import ZERO_A, first_zero
 
 Start = tuple[float, float, float, float, float]
-"""At the start of an interval: the line's angle, its sine and cosine, k and a of the armature current."""
+"""Values at the start of an interval: the line's angle, its sine and cosine, k and a of the armature current."""
 
 
 def next_ending(net: Network, omega: float, state: Start, modes: Phases, limit: float) -> tuple[float, int]:
-    """Return when (s from now, at most a limit) the first current ends, and whose: a mask of SCRs and arcs."""
+    """Return when (s from now, at most a limit) the first current ends, and its SCRs and arcs as a mask."""
     theta, sine, cosine, k, a = state
     decay, decay_s = net.decay, net.decay_s
     mode_a, mode_b, mode_c = modes
@@ -33,11 +33,11 @@ def next_ending(net: Network, omega: float, state: Start, modes: Phases, limit: 
             slope -= decay_s * guard_b
             if guard_b < 0.0:
                 bend -= decay_s * decay_s * guard_b
-        if value < lowest:  # a loop of legs has shared its current again: who would carry it backwards most goes out
+        if value < lowest:  # a loop of legs has shared its current again: the one with the largest reverse current ends
             lowest, first, out = value, 0.0, mask
         if lowest < -ZERO_A:
             continue
-        # A parabola of this bend stays below the current: positive at the end, it proves that there is no zero.
+        # A parabola of this curvature stays below the current: positive at the end, it proves that there is no zero.
         if value > ZERO_A or (value >= -ZERO_A and slope >= 0.0):
             least = value if value > 0.0 else 0.0
             if least + first * (slope - 0.5 * bend * first) > 0.0:
@@ -51,7 +51,7 @@ def next_ending(net: Network, omega: float, state: Start, modes: Phases, limit: 
                 if final > 0.0 and (sag <= 0.0 or 2.0 * bend * least > sag * sag):
                     continue
         if -ZERO_A <= value <= ZERO_A and abs(guard_k) + abs(guard_a) + abs(guard_b) + bend < 1e-9:
-            zero = 0.0  # nothing drives it any more
+            zero = 0.0  # nothing drives it any longer
         else:
             zero = first_zero(c, d, guard_k, guard_a, guard_b, theta, omega, decay, decay_s, first, curve)
         if zero <= first:
@@ -70,9 +70,9 @@ def next_turn_on(
     state: Start,
     limit: float,
 ) -> tuple[float, int]:
-    """Return when (s from now) forward voltage first turns on SCRs of a mask, and which; inf if not before a limit.
+    """Return when (s from now) forward voltage first turns on SCRs, and their mask; inf if not before a limit.
 
-    ``state`` is the line's angle, its sine and cosine, and k and a of the armature current. No SCR with a time
+    ``state`` is the line's angle, its sine and cosine, and k and a of the armature current. A time with an empty mask
     means that nothing is known beyond it: some SCR rests until then.
     """
     wanted = bridge.candidates(now_ns, net.mask)
@@ -100,7 +100,7 @@ def next_turn_on(
         bend = curve
         if fade > 0.0:
             bend += decay * decay * fade
-        # As for the currents: a parabola that stays above the voltage and is negative proves that nothing happens.
+        # As for the currents: a parabola that stays above the voltage and is negative proves that nothing turns on.
         if value + horizon * (slope + 0.5 * bend * horizon) < 0.0:
             continue
         horizon = min(horizon, (bridge.window_end_ns(mask, now_ns) - now_ns) * 1e-9)

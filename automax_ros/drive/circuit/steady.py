@@ -17,13 +17,13 @@ from automax_ros.drive.circuit.scr import FORWARD, REVERSE
 from automax_ros.drive.circuit.waves import WavePiece
 
 SETTLED = 1e-9
-"""Two windows that differ by less than this part are the same."""
+"""Two windows whose relative difference is less than this are equal."""
 MOST_CYCLES = 2000
 
 
 @dataclass(frozen=True)
 class BridgeCase:
-    """What ``automax bridge`` is asked about; SI units, alpha in degrees from natural commutation.
+    """The case that ``automax bridge`` computes; SI units, alpha in degrees from natural commutation.
 
     Attributes:
         v_ll_v: line-to-line voltage, V rms.
@@ -31,8 +31,8 @@ class BridgeCase:
         source_h: source inductance of a phase.
         source_ohm: source resistance of a phase.
         resistance_ohm: resistance of the load.
-        inductance_h: its inductance.
-        emf_v: its EMF, positive against current of bridge 1.
+        inductance_h: inductance of the load.
+        emf_v: EMF of the load, positive against current of bridge 1.
         alpha_deg: firing angle, 0 to 180.
         reverse: whether bridge 2 is fired.
     """
@@ -48,14 +48,14 @@ class BridgeCase:
     reverse: bool = False
 
     def check(self) -> None:
-        """Raise a ParameterError for what cannot be."""
+        """Raise a ParameterError for an impossible value."""
         require("line-to-line voltage in V", self.v_ll_v, SMALLEST, LARGEST)
         require("alpha in degrees", self.alpha_deg, 0.0, 180.0)
         self.line()
         FixedLoad(self.resistance_ohm, self.inductance_h, self.emf_v)
 
     def line(self, angle_rad: float = 0.0) -> AcLine:
-        """Return the line, at an angle at the start."""
+        """Return the line with an angle at its start."""
         return AcLine(
             self.v_ll_v,
             self.frequency_hz,
@@ -65,7 +65,7 @@ class BridgeCase:
         )
 
     def circuit(self, angle_rad: float = 0.0) -> Circuit:
-        """Return the circuit with ideal SCRs: what they need to recover is told as a margin instead."""
+        """Return the circuit with ideal SCRs: their recovery is reported as a margin instead."""
         load = FixedLoad(self.resistance_ohm, self.inductance_h, self.emf_v)
         return Circuit(self.line(angle_rad), Bridge(turn_off_s=0.0), load)
 
@@ -77,7 +77,7 @@ class BridgeCase:
 
 @dataclass(frozen=True)
 class SteadyState:
-    """What repeats every 60 degrees.
+    """The steady state, which repeats every 60 degrees.
 
     Attributes:
         mean_current_a: mean armature current, A; negative from bridge 2.
@@ -86,8 +86,8 @@ class SteadyState:
         mean_voltage_v: mean voltage over the load, V.
         zero_current_us: time without current, us in each 60 degrees.
         overlap_deg: degrees in each 60 during which two SCRs share a rail.
-        continuous: whether the current never ends.
-        margin_deg: what is left of the half cycle after firing and overlap, for the outgoing SCR to recover, degrees.
+        continuous: whether the current is never zero.
+        margin_deg: rest of the half cycle after firing and overlap, for the outgoing SCR to recover, degrees.
         start_current_a: armature current at the instant of firing, A.
     """
 
@@ -106,8 +106,8 @@ def steady_state(case: BridgeCase) -> SteadyState:
     """Return the steady state; gates are 60 degrees long, so that discontinuous conduction starts when it can.
 
     Raises:
-        ParameterError: the case cannot be.
-        SteadyStateError: no state repeats: commutation fails.
+        ParameterError: the case is impossible.
+        SteadyStateError: no state repeats, because commutation fails.
     """
     case.check()
     current = _fixed_point(case)
@@ -120,9 +120,9 @@ def steady_state(case: BridgeCase) -> SteadyState:
 
 
 def _window(case: BridgeCase, current_a: float) -> Circuit | None:
-    """Return the circuit after 60 degrees from the firing of its first SCR with a current, None if it does not fit.
+    """Return the circuit 60 degrees after its first SCR is fired at a current, None if the window is not valid.
 
-    It fits if before and after it two SCRs, or none, conduct.
+    It is valid if two SCRs, or none, conduct before and after it.
     """
     numbers = REVERSE if case.reverse else FORWARD
     circuit = case.circuit(natural_angle(numbers[0], case.line()) + radians(case.alpha_deg))
@@ -135,7 +135,7 @@ def _window(case: BridgeCase, current_a: float) -> Circuit | None:
 
 
 def _fixed_point(case: BridgeCase) -> float | None:
-    """Return the current at firing that returns after 60 degrees (secant method), None if there is none such."""
+    """Return the current at firing that recurs after 60 degrees (secant method), None if there is none."""
     sign = -1.0 if case.reverse else 1.0
     before, gain_before = 0.0, None
     current = 0.0
@@ -156,7 +156,7 @@ def _fixed_point(case: BridgeCase) -> float | None:
 
 
 def _simulated(case: BridgeCase) -> SteadyState:
-    """Return what a simulation from rest settles to: for overlaps beyond 60 degrees, or to find that none does."""
+    """Return the state in which a simulation from rest settles: for overlaps beyond 60 degrees, or to find none."""
     circuit = case.circuit()
     bridge = ConstantAlpha(circuit, radians(case.alpha_deg), bridge=2 if case.reverse else 1)
     before = mean = inf
@@ -170,7 +170,7 @@ def _simulated(case: BridgeCase) -> SteadyState:
         before, mean = mean, sum(means) / 6
         least = max(1.0, abs(mean))
         if abs(mean - before) <= SETTLED * least:
-            # A pair that stays on for good repeats too, but that is not a bridge at work.
+            # A pair that stays on for ever repeats too, but then the bridge does not work.
             if max(means) - min(means) > 1e-4 * least or len(ends) < 6:
                 break
             return _describe(case, windows, start_current_a)
@@ -226,7 +226,7 @@ def _extremes(pieces: list[WavePiece], with_zero: bool) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Moment:
-    """What an oscilloscope would show at one instant: times in s, volts, amperes, numbers of SCRs."""
+    """The waveforms at one instant: times in s, volts, amperes, numbers of SCRs."""
 
     time_s: float
     phases_v: tuple[float, float, float]
@@ -246,7 +246,7 @@ def waveforms(case: BridgeCase, state: SteadyState, *, cycles: int = 2, step_ns:
         circuit.begin_with((numbers[4], numbers[5]), state.start_current_a)
     controller = ConstantAlpha(circuit, alpha, bridge=bridge)
     for number in range(round(cycles * 6 * case.window_ns / step_ns) + 1):
-        # A nanosecond after the grid, so that what happens on it is seen.
+        # A nanosecond after the grid, so that events on it are included.
         controller.advance(number * step_ns + 1)
         now = circuit.now_ns
         phases = (

@@ -1,4 +1,4 @@
-"""Quantities of a conduction interval in closed form, their zeros, integrals and extremes.
+"""Quantities of a conduction interval in closed form: zeros, integrals and extremes.
 
 Within an interval every current and voltage is one wave of the time t since its start::
 
@@ -16,10 +16,10 @@ from typing import Final
 from automax_ros.core.machine_code import mypyc_attr
 
 STRIDE_S: Final = 1e-8
-"""A dip below zero that is shorter than this may be passed over: its depth is below 1e-8 A in any real circuit."""
+"""A dip below zero that is shorter than this may be skipped: its depth is below 1e-8 A in any real circuit."""
 NEWTON_S: Final = 1e-6
 NEWTON_LEFT: Final = 1e-4
-"""Closer than this (s) to a zero two Newton steps find it; they have if the first left at most this part."""
+"""Closer than this (s) to a zero, two Newton steps find it: they have if the first left at most this part."""
 ZERO_A: Final = 1e-7
 """A current that falls and is below this (A) has ended: two orders above rounding in circuits without resistance."""
 
@@ -39,8 +39,8 @@ def first_zero(
 ) -> float:
     """Return the first instant in [0, limit] (s) at which a wave that begins at or above 0 falls below; inf if none.
 
-    The search never steps over a zero. The second derivative cannot lie below -(omega^2 hypot(c, d) + what the
-    exponentials with a negative factor add), so a parabola with that curvature stays under the wave, and its zero is a
+    The search never steps over a zero. The second derivative cannot be below -(omega^2 hypot(c, d) + the share of
+    exponentials with a negative factor), so a parabola with that curvature stays under the wave, and its zero is a
     safe step. Near the wave's zero the steps become Newton's; where the wave only grazes zero their number grows with
     the logarithm of the clearance.
 
@@ -80,7 +80,7 @@ def first_zero(
             return 0.0
         before, above = t, value
         reach = slope * slope + 2.0 * bend * value
-        # Of the two forms of the parabola's zero the one without cancellation.
+        # Of the two formulas of the parabola's zero, the one without cancellation.
         if slope >= 0.0:
             step = (slope + sqrt(reach)) / bend if bend > 0.0 else inf
         else:
@@ -141,15 +141,15 @@ def _between(
 
 @mypyc_attr(acyclic=True)
 class WavePiece:
-    """The armature current (A) over one conduction interval; nobody changes it."""
+    """The armature current (A) over one conduction interval; immutable."""
 
-    # Not a tuple: compiled, its numbers stand in it, where a tuple has eight objects.
+    # Not a tuple: compiled, it contains its numbers, where a tuple has eight objects.
     __slots__ = ("_is_squared", "_square", "a", "c", "d", "decay", "duration_s", "k", "omega", "theta")
 
     def __init__(
         self, duration_s: float, theta: float, omega: float, c: float, d: float, k: float, a: float, decay: float
     ) -> None:
-        """Take the duration (s), the line's angle at the start and its angular frequency, and the wave's factors."""
+        """Create the piece from its duration (s), the line's angle at its start and frequency, and its factors."""
         self.duration_s = duration_s
         self.theta = theta
         self.omega = omega
@@ -161,7 +161,7 @@ class WavePiece:
         self._square, self._is_squared = 0.0, False
 
     def numbers(self) -> list[float]:
-        """Return the arguments of a piece like this."""
+        """Return the arguments that create an equal piece."""
         return [self.duration_s, self.theta, self.omega, self.c, self.d, self.k, self.a, self.decay]
 
     def value(self, t: float) -> float:
@@ -170,7 +170,7 @@ class WavePiece:
         return self.c * cos(angle) + self.d * sin(angle) + self.k + self.a * exp(-self.decay * t)
 
     def square(self) -> float:
-        """Return the integral of the current's square (A^2 s); computed when it is asked for first."""
+        """Return the integral of the current's square (A^2 s); computed on the first call."""
         if not self._is_squared:
             moments = Moments(self.theta, self.omega, self.decay, inf, self.duration_s)
             self._square, self._is_squared = moments.square((self.c, self.d, self.k, self.a, 0.0)), True
@@ -191,7 +191,7 @@ class WavePiece:
         return min(values), max(values)
 
     def _slope_zero(self, sign: float, slope: tuple[float, ...], start: float) -> float:
-        """Return how long after ``start`` the slope, times sign, falls below zero."""
+        """Return the time after ``start`` at which the slope, times sign, falls below zero."""
         c, d, k, a, _ = (sign * factor for factor in slope)
         angle = self.theta + self.omega * start
         a *= exp(-self.decay * start)
@@ -199,7 +199,7 @@ class WavePiece:
 
 
 def bound(piece: WavePiece) -> float:
-    """Return what the magnitude of a piece's current (A) cannot pass: its ends, and what its bend allows between."""
+    """Return an upper bound of the magnitude of a piece's current (A), from its ends and its curvature between them."""
     duration, theta, omega = piece.duration_s, piece.theta, piece.omega
     c, d, k, a, decay = piece.c, piece.d, piece.k, piece.a, piece.decay
     end = theta + omega * duration
@@ -214,10 +214,10 @@ Wave = tuple[float, float, float, float, float]
 
 
 class Moments:
-    """The integrals of all products of the five functions that a wave is made of, over one interval."""
+    """The integrals over one interval of all products of the five functions of which a wave consists."""
 
     def __init__(self, theta: float, omega: float, decay: float, decay_b: float, duration: float) -> None:
-        """Compute them; a decay_b of inf means that the part has vanished."""
+        """Compute the integrals; a decay_b of inf means that its part has vanished."""
         end = theta + omega * duration
         s0, c0, s1, c1 = sin(theta), cos(theta), sin(end), cos(end)
         half_swing = (s1 * c1 - s0 * c0) / (2 * omega)

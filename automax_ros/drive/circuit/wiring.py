@@ -1,4 +1,4 @@
-"""The wiring of a bridge: what is closed, open or shorted besides the SCRs that conduct, and where current can flow."""
+"""The wiring of a bridge apart from its conducting SCRs: closed, open or shorted parts, and paths for the current."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ARMATURE_ARC: Final = 1 << 15
 
 @dataclass(frozen=True)
 class Wiring:
-    """What is closed, open or shorted besides the SCRs that conduct.
+    """The closed, open or shorted parts apart from the conducting SCRs.
 
     Attributes:
         shorted: mask of legs (6 bits) that a failed SCR shorts.
@@ -53,7 +53,7 @@ def closed_legs(mask: int, wiring: Wiring) -> dict[int, int]:
 
 
 def settle(mask: int, wiring: Wiring) -> int:
-    """Return a mask without the SCRs that can carry no current, for want of a way round."""
+    """Return a mask without the SCRs that cannot carry current because there is no return path."""
     edges: dict[int, tuple[int, int]] = {leg: (leg // 2, 3 + leg % 2) for leg in closed_legs(mask, wiring)}
     edges.update({10 + x: (x, 5) for x in range(3) if not wiring.open_phases >> x & 1})
     if wiring.armature_closed:
@@ -69,7 +69,7 @@ def settle(mask: int, wiring: Wiring) -> int:
 
 
 def is_line_short(rail: int, legs: dict[int, int]) -> bool:
-    """Whether the phases on a rail are shorted for longer than a commutation: not all conduct the same way."""
+    """Return whether the phases on a rail are shorted for longer than a commutation: not all conduct the same way."""
     ways = [legs[leg] for leg in legs if leg % 2 == rail]
     return len(ways) > 1 and abs(sum(ways)) != len(ways)
 
@@ -84,7 +84,7 @@ def leg_currents(legs: dict[int, int]) -> dict[int, tuple[float, float, float, f
             weights[leg] = _weights({1 + x: 1.0})
     if not both:
         return weights
-    # What flows into P apart from the phases that sit on both rails: the armature current less the single legs there.
+    # Current into P apart from the phases on both rails: the armature current less that of the single legs there.
     into_p = {0: 1.0 / len(both)}
     for leg in legs:
         if leg % 2 == P and leg // 2 not in both:

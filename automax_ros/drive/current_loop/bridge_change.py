@@ -26,19 +26,19 @@ RECOVERY_US: Final = 500
 VD0: Final = 1.3505
 """Ideal mean voltage of a bridge over the line-to-line voltage: 3 sqrt(2) / pi."""
 PRESET: Final = 0.6
-"""Largest part of a scan that a preset lets conduct, by the law of ``regulator`` (decision)."""
+"""Largest conducting part of a scan after a preset, by the law of ``regulator`` (decision)."""
 HIGHEST_COS: Final = 0.95
 """Alpha of a preset lies between the angles of this cosine (decision)."""
 
 
 class Stage(enum.IntEnum):
-    """How far a change is."""
+    """The stage of a change."""
 
     NONE = 0
     BACK = 1
     """The old bridge is phased back."""
     OFF = 2
-    """No current was seen; all gates are off."""
+    """No current was measured; all gates are off."""
 
 
 class BridgeChange(Stateful):
@@ -46,18 +46,18 @@ class BridgeChange(Stateful):
 
     Attributes:
         bridge: 1 or 2, the one in use.
-        stage: how far a change to the other is.
+        stage: the stage of a change to the other.
     """
 
     _kept = ("bridge", "stage")
 
     def __init__(self) -> None:
-        """Begin on bridge 1."""
+        """Create the selection, with bridge 1 in use."""
         self.bridge = 1
         self.stage = Stage.NONE
 
     def begin(self, bridge: int) -> None:
-        """Begin on a bridge, without current."""
+        """Start with a bridge, without current."""
         self.bridge = bridge
         self.stage = Stage.NONE
 
@@ -71,19 +71,19 @@ class BridgeChange(Stateful):
         late: bool = False,
         gated: bool = False,
     ) -> bool:
-        """Move on by a scan; return whether the other bridge is in use from now on.
+        """Execute a scan; return whether the other bridge is in use from now on.
 
         Args:
-            measured: what was measured in the last scan.
+            measured: the measurements of the last scan.
             wanted: the reference after the lag, counts.
             scan_us: the time of a scan.
             fast: whether the fast change is on.
-            late: whether commands come after their interrupt: the gates have gone on meanwhile, so what was measured
-                before the change began does not tell that no current flows.
+            late: whether commands come after their interrupt: the gates have continued meanwhile, so measurements from
+                before the change do not prove that no current flows.
             gated: whether a gate of the old bridge, fired after this interrupt, may come before the command: it
                 conducts again then, and the other bridge would fire across.
         """
-        # Its sign decides, from one count on (52.1.2): what keeps it from chattering is the change itself.
+        # The sign decides, from one count on (52.1.2): the time of the change itself prevents chattering.
         against = round(wanted if self.bridge == 2 else -wanted)
         if self.stage == Stage.NONE:
             if against < 1:
@@ -105,13 +105,13 @@ class BridgeChange(Stateful):
 
 
 def preset_us(measured: Measured, bridge: int, wanted: float, thresh: int, period_us: float) -> float:
-    """Return the DELTA with which a bridge begins so that it gives a current at once, by the CEMF measured.
+    """Return the DELTA with which a bridge supplies current at once, from the measured CEMF.
 
     Without armature voltage feedback the CEMF is taken as 0, alpha is 90 degrees whatever the reference: at speed that
     ends in IOC, as 52.6.2 says (decision).
 
     Args:
-        measured: what was measured at the end of the last scan, in which no current flowed.
+        measured: the measurements of the last scan, in which no current flowed.
         bridge: 1 or 2.
         wanted: magnitude of the reference, counts.
         thresh: CC_THRESH, counts: a smaller reference begins with an earlier DELTA.

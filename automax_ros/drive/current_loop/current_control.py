@@ -1,6 +1,7 @@
 """The current control: feedback, reference chain, regulator, choice of the bridge, phase firing (52.1.2, 52.2.1).
 
-Start, stop and faults are not its business: it is told to begin, to scan with a reference, to fire open loop, or off.
+It does not handle start, stop and faults: its caller begins a run, scans with a reference, fires open loop, or turns it
+off.
 """
 
 from __future__ import annotations
@@ -27,23 +28,23 @@ AHEAD_US: Final = 50
 """By how much a command must come before the next pulse of the old bridge, us (decision: no two scans take the same
 time)."""
 FRESH_SCANS: Final = 2
-"""Scans that a preset is given to show a current before the search goes on from it (decision)."""
+"""Scans within which a preset must give a current; then the search continues from it (decision)."""
 
 
 class CurrentControl(Stateful):
-    """Keeps the armature current on its reference; ``parts`` are what its state consists of.
+    """Keeps the armature current on its reference; ``parts`` are the parts with state.
 
     Attributes:
         i_fdbk: I_FDBK of the last scan, counts.
         dc_time: DC_TIME of the last scan, us.
         part: part of the last scan in which current flowed.
-        block: whether gates that are on shall end at once.
+        block: whether gates that are on must end at once.
     """
 
     _kept = ("i_fdbk", "dc_time", "part", "block", "_fresh")
 
     def __init__(self) -> None:
-        """Begin with everything off."""
+        """Create the control with everything off."""
         self.i_fdbk = 0
         self.dc_time = 0
         self.part = 0.0
@@ -73,16 +74,16 @@ class CurrentControl(Stateful):
         return self.part < 1.0
 
     def begin(self) -> None:
-        """Begin a run: references and DELTA at 0, on bridge 1."""
+        """Start a run: references and DELTA at 0, on bridge 1."""
         self.chain.begin()
         self._take(1, 0.0)
 
     def feed_back(self, measured: Measured, lim_bar: int, period_ns: int) -> None:
-        """Scale the mean current of the last scan, 4095 counts at LIM_BAR: once each scan, whatever the drive does."""
+        """Scale the mean current of the last scan, 4095 counts at LIM_BAR: once per scan, whatever the drive does."""
         counts = measured.current * COUNTS / lim_bar
         zero_us = measured.zero_us
         self._late_us = late_us(measured.status)
-        # DC_TIME is in whole us, and the scan a little longer.
+        # DC_TIME is in whole us, and the scan is slightly longer.
         self.part = max(0.0, 1.0 - zero_us * 6000 / (period_ns - 12_000)) if zero_us else 1.0
         self.i_fdbk = self.regulator.feedback(counts, self.part)
         self.dc_time = zero_us if zero_us < LONGEST_ZERO_US else LONGEST_ZERO_US
@@ -93,10 +94,10 @@ class CurrentControl(Stateful):
         """Regulate the current and plan the pulses up to the next interrupt.
 
         Args:
-            measured: what was measured since the last interrupt; ``feed_back`` has seen it.
+            measured: the measurements since the last interrupt, already passed to ``feed_back``.
             reference: counts, 4095 at LIM_BAR; 0 in a stop.
             settings: the inputs in force.
-            pll: where the line is.
+            pll: position in the line cycle.
             reverse: whether the SCRs are fired in the order of the other rotation.
         """
         period_us = pll.period_ns * 1e-3
@@ -104,7 +105,7 @@ class CurrentControl(Stateful):
         wanted = self.chain.scan(reference, settings.ref_rate, settings.ref_lag, scan_us * 1e-6)
         fast = settings.fast_change
         late = self._late_us
-        # The pulse that was planned ahead stands where DELTA has it in a scan; without gates there is none.
+        # The pulse that was planned ahead is at the place of DELTA in a scan; without gates there is none.
         gated = not self.block and late > (3.0 * scan_us - self.regulator.delta_us) % scan_us - AHEAD_US
         self.block = False
         guard_ns = 0
@@ -119,7 +120,7 @@ class CurrentControl(Stateful):
         return self._fire(pll, self.regulator.delta_us, self.change.bridge, reverse, guard_ns)
 
     def _phase_back(self, pll: Pll, reverse: bool) -> tuple[Pulse, ...]:
-        """Bring the current of the bridge in use to zero, then take its gates away."""
+        """Bring the current of the bridge in use to zero, then turn its gates off."""
         if self.change.stage == Stage.OFF or (self._late_us and self.part < 1.0):
             self.block = True
             self.regulator.begin(0.0)
@@ -129,7 +130,7 @@ class CurrentControl(Stateful):
         return self._fire(pll, self.regulator.delta_us, self.change.bridge, reverse)
 
     def _regulate(self, wanted: float, settings: Latched, period_us: float) -> None:
-        """Find DELTA for the bridge in use."""
+        """Compute DELTA for the bridge in use."""
         regulator, part = self.regulator, self.part
         regulator.see_late(self._late_us, period_us)
         if self.change.bridge == 2:
@@ -147,7 +148,7 @@ class CurrentControl(Stateful):
             elif wanted >= 1.0:
                 regulator.search(error, kp, wanted / FULL, period_us)
             return
-        if self._fresh > 0:  # a part of the scan was the dead time's
+        if self._fresh > 0:  # a part of the scan was dead time
             self._fresh = 0
             return
         gain = kp * settings.pi_w_lead * period_us / 6e6
@@ -164,12 +165,12 @@ class CurrentControl(Stateful):
         return self._fire(pll, delta_us, bridge, reverse)
 
     def off(self) -> tuple[Pulse, ...]:
-        """Fire nothing; the cycle is counted on."""
+        """Fire nothing; the count of the cycle continues."""
         self.firing.idle()
         return ()
 
     def show(self, outputs: Outputs) -> None:
-        """Write the loop's outputs; to be called in run alone, they are held in standby (52.2.1)."""
+        """Write the loop's outputs; to be called only in run, they are held in standby (52.2.1)."""
         chain, regulator = self.chain, self.regulator
         outputs.dc_time = self.dc_time
         outputs.bridge_pol = self.change.bridge == 2
@@ -178,7 +179,7 @@ class CurrentControl(Stateful):
         outputs.integral_gain, outputs.delta = regulator.integral_gain, round(regulator.delta_us)
 
     def _take(self, bridge: int, delta_us: float) -> None:
-        """Begin to use a bridge that has no current at a DELTA, us."""
+        """Start to use a bridge without current at a DELTA, us."""
         self.change.begin(bridge)
         self.regulator.begin(delta_us)
         self.firing.begin()

@@ -1,9 +1,9 @@
-"""The drive faults of the current minor loop: what causes each, and how long it lasts (52.1.5, 52.2.2, 52.4).
+"""The drive faults of the current minor loop: their causes, latching and reset (52.1.5, 52.2.2, 52.4).
 
-All are looked for at each scan, in standby too (decision), but tach loss, which needs a DELTA. A fault is latched and
+All but tach loss, which needs a DELTA, are checked at each scan, in standby too (decision). A fault is latched and
 logged once; it stays until FAULT_RESET in standby finds its cause gone. While one is active no start is accepted; one
-that comes while the drive runs makes it coast, but for a tach loss that TACH_LOSS_STOP only indicates. FAULT_RESET is
-a level, looked at each system clock tick, not an edge; it takes back nothing that no tick has shown yet (decision).
+that occurs while the drive runs makes it coast, except a tach loss that TACH_LOSS_STOP only indicates. FAULT_RESET is
+a level, read at each system clock tick, not an edge; it resets nothing that no tick has shown yet (decision).
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ EXT_IET: Final = 1 << 4
 PHROT: Final = 1 << 5
 BAD_SCR: Final = 1 << 6
 HARDWARE: Final = 1 << 7
-"""Stands next to OSV among the causes where the hardware's overspeed circuit saw it and OSV_FDBK does not."""
+"""Accompanies OSV among the causes where the hardware's overspeed circuit detected it and OSV_FDBK does not."""
 OSV_PROBLEM: Final = 7113
 OVERSPEED_TRIP: Final = 7119
-"""What an OSV is logged as, and what it is logged as then."""
+"""Problem of an OSV, and the problem logged instead where HARDWARE is set."""
 
 
 class FaultKind(NamedTuple):
@@ -49,16 +49,16 @@ KINDS: Final = (
     FaultKind(PHROT, "phrot_flt_out", 7115),
     FaultKind(BAD_SCR, "bad_scr_out", 7116),
 )
-"""The drive faults, in the order in which they are logged when several come at once."""
+"""The drive faults, in the order in which they are logged when several occur at once."""
 
 SYNC_SCANS: Final = 360
 """Scans from task initialisation within which the line sync must lock, or it is lost: 1 s at 60 Hz (decision)."""
 TACH_SCANS: Final = 16
-"""Scans of DELTA that tach loss looks at (52.4)."""
+"""Scans whose DELTA tach loss averages (52.4)."""
 TACH_SPEED: Final = 205
-"""SPEED_FDBK below which the motor seems to stand: 5 % of 4095 (52.4)."""
+"""SPEED_FDBK below which the motor counts as stopped: 5 % of 4095 (52.4)."""
 TACH_HIGHEST_DEG: Final = 127
-"""The threshold of register 4136 is limited to 0 and this in use (52.4.1)."""
+"""The threshold of register 4136 is limited to 0 up to this in use, degrees (52.4.1)."""
 
 
 class Faults(Stateful):
@@ -72,7 +72,7 @@ class Faults(Stateful):
     _kept = ("active", "bad_scr_num", "_shown", "_sync_left", "_deltas", "_delta_sum", "_delta_count")
 
     def __init__(self) -> None:
-        """Begin without faults."""
+        """Create the faults, none active."""
         self.active = 0
         self.bad_scr_num = 0
         self._shown = 0
@@ -81,19 +81,19 @@ class Faults(Stateful):
         self._delta_sum = self._delta_count = 0
 
     def begin_run(self) -> None:
-        """A run begins: DELTA is averaged from here on."""
+        """Start a run: DELTA is averaged from here on."""
         self._deltas = [0] * TACH_SCANS
         self._delta_sum = self._delta_count = 0
 
     def note_delta(self, delta_us: int) -> None:
-        """Note the DELTA (us) of a scan in which the drive runs."""
+        """Record the DELTA (us) of a scan in which the drive runs."""
         place = self._delta_count % TACH_SCANS
         self._delta_sum += delta_us - self._deltas[place]
         self._deltas[place] = delta_us
         self._delta_count += 1
 
     def causes(self, measured: Measured, inputs: Inputs, settings: Latched, pll: Pll, *, running: bool) -> int:
-        """Return the bits of the faults whose cause is there at this scan, BAD_SCR left out."""
+        """Return the bits of the faults whose cause is present at this scan, apart from BAD_SCR."""
         status = measured.status
         found = 0
         if status & OVERCURRENT:
@@ -129,7 +129,7 @@ class Faults(Stateful):
         return self.latch(BAD_SCR)
 
     def reset(self, causes: int) -> None:
-        """Take back the faults whose cause is gone, of those that a tick has shown."""
+        """Reset the faults whose cause is gone, of those that a tick has shown."""
         self.active &= causes | ~self._shown
         if not self.active & BAD_SCR:
             self.bad_scr_num = 0
@@ -156,7 +156,7 @@ class Faults(Stateful):
         return not self._sync_left or measured.phase_step <= 0 or measured.period_step <= 0
 
     def _tach_lost(self, measured: Measured, speed: int, pll: Pll) -> bool:
-        """Return whether the mean DELTA says that the motor turns while SPEED_FDBK says that it stands."""
+        """Return whether the motor turns by the mean DELTA but is stopped by SPEED_FDBK."""
         if abs(speed) >= TACH_SPEED or self._delta_count < TACH_SCANS:
             return False
         threshold = max(0, min(TACH_HIGHEST_DEG, measured.tach_threshold))

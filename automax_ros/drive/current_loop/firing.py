@@ -1,8 +1,8 @@
-"""Phase firing: which gates are pulsed when, from one interrupt to the next (52.2.1, DELTA).
+"""Phase firing: the gate pulses from one interrupt to the next (52.2.1, DELTA).
 
 An SCR is fired DELTA before the instant of alpha 180 degrees, and the one before it again (double pulse), for a sixth
-of a cycle. At an interrupt all is planned that falls due before the next. What a greater DELTA makes late is fired at
-once if the next is not due yet; none is fired twice (decision).
+of a cycle. At an interrupt all pulses that are due before the next are planned. What a greater DELTA makes late is
+fired at once if the next is not due yet; none is fired twice (decision).
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ _new = tuple.__new__
 
 
 class Firing(Stateful):
-    """Plans pulses. ``last`` counts the sixths of cycles: that of the SCR that was fired last."""
+    """Plans pulses; ``last`` is the count of sixths of cycles at which the last SCR was fired."""
 
     _kept = ("count", "last")
 
     def __init__(self) -> None:
-        """Begin with nothing fired."""
+        """Create the planner, with nothing fired yet."""
         self.count = 0
         self.last = -6
 
     def begin(self) -> None:
-        """Begin again: any SCR may be fired next."""
+        """Start again: any SCR may be fired next."""
         self.last = self.count - 6
 
     def idle(self) -> None:
-        """Fire nothing up to the next interrupt; the cycle is counted on."""
+        """Fire nothing up to the next interrupt; the count of the cycle continues."""
         self.count += 1
 
     def pulses(
@@ -61,10 +61,10 @@ class Firing(Stateful):
         *,
         ahead: bool = False,
     ) -> tuple[Pulse, ...]:
-        """Plan the time from an interrupt, at a position of the cycle, to the next.
+        """Plan the pulses from an interrupt, at a position of the cycle, to the next.
 
         Args:
-            position: which sixth of the cycle begins, 0 to 5.
+            position: the sixth of the cycle that begins, 0 to 5.
             period_ns: the line's period, ns.
             next_ns: time to the next interrupt, ns.
             delta_ns: DELTA, ns, 0 to half a period.
@@ -72,7 +72,7 @@ class Firing(Stateful):
             reverse: whether the line has the other rotation.
             earliest_ns: no pulse begins sooner after the interrupt, ns.
             ahead: whether the next command comes after its interrupt: the pulse after the last one is planned too, to
-                be fired by this DELTA unless the next command comes first.
+                be fired with this DELTA unless the next command comes first.
         """
         planned = self._plan(position, period_ns, next_ns, delta_ns, bridge, reverse, earliest_ns)
         if ahead:
@@ -86,7 +86,7 @@ class Firing(Stateful):
     def _plan(
         self, position: int, period_ns: int, next_ns: int, delta_ns: int, bridge: int, reverse: bool, earliest_ns: int
     ) -> tuple[Pulse, ...]:
-        """Plan what begins before the next interrupt."""
+        """Plan the pulses that begin before the next interrupt."""
         self.count = count = self.count + 1
         sixth = period_ns // 6
         delay = max(0, 3 * sixth - delta_ns)

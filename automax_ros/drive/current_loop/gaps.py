@@ -1,8 +1,9 @@
 """Gaps in the current: pulses that are missing in every cycle, as with an open gate or a blown fuse (52.3).
 
-The current of a sound bridge is alike in all six scans of a cycle. Where some of them bring little while the reference
-is steady, a regulator that answers each of them would swing the sound pulses up until the drive trips. So it follows
-the mean of a cycle then, slowly, and keeps DELTA nearly constant: the drive runs on and can be diagnosed (decision).
+The current of a sound bridge is alike in all six scans of a cycle. Where some of them have little current while the
+reference is steady, a regulator that reacts to each of them would drive up the sound pulses until the drive trips.
+So it follows the mean of a cycle then, slowly, and keeps DELTA nearly constant: the drive runs on and can be diagnosed
+(decision).
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ HIGH: Final = 0.75
 STEADY: Final = 12
 """Scans for which a reference must have been steady (decision)."""
 STEP: Final = 0.06
-"""Part of itself by which a steady reference changes in a scan at most, and ``STEP_COUNTS`` more (decision)."""
+"""Largest change of a steady reference in a scan: this part of it plus ``STEP_COUNTS`` (decision)."""
 STEP_COUNTS: Final = 12.0
 MEMORY: Final = 18
 """Scans for which the regulator stays slow after a gap (decision: three cycles)."""
 SURGE: Final = 1.4
-"""A scan that brings this times the greatest of the cycle before, and ``SURGE_COUNTS`` more, has another reason
-(decision)."""
+"""A scan above this times the greatest of the previous cycle and the reference, plus ``SURGE_COUNTS``, is not due to a
+gap, and the regulator is no longer slow (decision)."""
 SURGE_COUNTS: Final = 400.0
 
 
@@ -37,20 +38,20 @@ class Gaps(Stateful):
 
     Attributes:
         recent: the current of the last six scans, counts in the direction of the bridge in use.
-        left: for how many scans the regulator stays slow; 0 while there is no gap.
+        left: scans for which the regulator stays slow; 0 while there is no gap.
     """
 
     _kept = ("recent", "left", "_wanted", "_steady")
 
     def __init__(self) -> None:
-        """Begin without a current."""
+        """Create the watch, without a current."""
         self.recent = [0.0] * CYCLE
         self.left = 0
         self._wanted = 0.0
         self._steady = 0
 
     def begin(self) -> None:
-        """Begin a run, or on another bridge."""
+        """Start a run, or use of another bridge."""
         self.recent = [0.0] * CYCLE
         self.left = self._steady = 0
 
@@ -61,7 +62,7 @@ class Gaps(Stateful):
         return (recent[0] + recent[1] + recent[2] + recent[3] + recent[4] + recent[5]) / CYCLE
 
     def see(self, current: float, wanted: float) -> bool:
-        """See current and reference of a scan, counts in the direction of the bridge; return whether there are gaps."""
+        """Add current and reference of a scan, counts in the direction of the bridge; return whether there are gaps."""
         recent = self.recent
         greatest = max(recent)
         surge = current > SURGE * max(greatest, wanted) + SURGE_COUNTS
@@ -80,7 +81,7 @@ class Gaps(Stateful):
         return self.left > 0
 
     def _is_gap(self, current: float, greatest: float, wanted: float) -> bool:
-        """Return whether a scan gaps: to begin with against the reference, then against the cycle's own mean."""
+        """Return whether a scan is a gap: first compared with the reference, then with the mean of the cycle."""
         if self.left:
             wanted = self.mean
             return current < LOW * wanted and wanted >= LEAST

@@ -1,13 +1,12 @@
-"""The inputs of DC_DRIVE_CML as the loop gets them at each scan: what the task has latched, in the order of 52.1.
+"""The inputs of DC_DRIVE_CML as the task has latched them, when each is read, and the handling of bad values (52.1).
 
-When each input of DC_DRIVE_CML is read, and what is in force when one is bad (52.1).
-
-Three clocks: REFERENCE at each scan; most of the others at each system clock tick, in run or in standby alone as
+Three clocks: REFERENCE at each scan; most of the others at each system clock tick, only in run or only in standby as
 table 1's text says; the fixed ones once, at task initialisation. A bad dynamic value is logged once, as it goes bad,
-and the last good one stays. A bad fixed one is logged, what ``Latched`` begins with stays, and the drive never runs.
+and the last good one stays. A bad fixed one is logged, the initial value of ``Latched`` stays, and the drive never
+runs.
 
 What is read in run is read as the run begins, too, so that no scan runs with values of the last run (decision).
-CC_THRESH, for which no clock is told, is read each tick (decision).
+CC_THRESH, for which the manual names no clock, is read at each tick (decision).
 """
 
 from __future__ import annotations
@@ -68,7 +67,7 @@ DIERIKON: Final = 2
 BAD_DYNAMIC: Final = 7105
 BAD_FIXED: Final = 7106
 BAD_LEVEL: Final = 7107
-"""Problems: a dynamic input out of range, a fixed one, IOC_THRESH of 1.8 LIM_BAR or more."""
+"""Problems: a dynamic input out of range, a fixed one out of range, IOC_THRESH of 1.8 LIM_BAR or more."""
 BAD_RATIO: Final = 7117
 """Problem: the phase change of the PLL is not twice its period change (52.5.1)."""
 
@@ -86,13 +85,13 @@ _SWITCHES: Final = ("digital_tach", "tach_loss_stop", "auto_phrot")
 _DYNAMIC: Final = ("cc_thresh", "ref_rate", "kp", "test_alpha")
 _SEEN: Final = 1 << len(_DYNAMIC)
 _TOLD: Final = _SEEN << 1
-"""Bits next to those of the dynamic inputs: registers of another ratio were seen at the last tick, and were logged."""
+"""Bits after those of the dynamic inputs: registers of another ratio were read at the last tick; they were logged."""
 _INPUTS: Final = _SEEN - 1
 
 
 @lru_cache(maxsize=64)
 def _is_rate_at_any_line(ref_rate: float) -> bool:
-    """Return whether REF_RATE has a value (s) within its limits whatever period the line may be measured to have."""
+    """Return whether a REF_RATE (s) is within its limits at every line period that can be measured."""
     return all(is_good("REF_RATE", ref_rate, 1e9 / period_ns) for period_ns in (SHORTEST_NS, LONGEST_NS))
 
 
@@ -110,7 +109,7 @@ class Latched(Stateful):
     )  # fmt: skip
 
     def __init__(self) -> None:
-        """Begin with zeros: what is in force before a good value was seen."""
+        """Create the inputs with zeros, which are in force until a good value is read."""
         self.usable = True
         self.ac_line_freq = 60
         self.reference = 0
@@ -151,16 +150,16 @@ class Latched(Stateful):
         return problems
 
     def standby(self, inputs: Inputs, options: int) -> None:
-        """Read at a tick what is read in standby: test mode, FAULT_RESET, register 4146."""
+        """Read the inputs of standby at a tick: test mode, FAULT_RESET, register 4146."""
         self.cml_test, self.test_brpol, self.fault_reset = inputs.cml_test, inputs.test_brpol, inputs.fault_reset
         self.fast_change, self.both_bridges = bool(options & FAST_CHANGE), bool(options & DIERIKON)
 
     def run(self, inputs: Inputs, period_ns: int) -> list[int]:
-        """Read at a tick what is read in run; return the problems to log.
+        """Read the inputs of run at a tick; return the problems to log.
 
         Args:
-            inputs: what the task has latched.
-            period_ns: the measured period of the line, ns: the limits of REF_RATE follow it.
+            inputs: the values that the task has latched.
+            period_ns: the measured period of the line, ns, which sets the limits of REF_RATE.
         """
         self.cml_coast_stop = inputs.cml_coast_stop
         problems = self._read("kp", inputs.kp, 0.0) if inputs.kp != self.kp or self._bad & _INPUTS else []
@@ -174,14 +173,14 @@ class Latched(Stateful):
         return problems
 
     def always(self, inputs: Inputs) -> list[int]:
-        """Read at a tick what is read in run and in standby; return the problems to log."""
+        """Read the inputs of both run and standby at a tick; return the problems to log."""
         self.cml_run = inputs.cml_run
         if inputs.cc_thresh == self.cc_thresh and not self._bad & _INPUTS:
             return []
         return self._read("cc_thresh", inputs.cc_thresh, 0.0)
 
     def ratio(self, phase_step: int, period_step: int) -> list[int]:
-        """See registers 4137 and 4138 at a tick; return the problem to log where they have another ratio than 2 to 1.
+        """Check registers 4137 and 4138 at a tick; return the problem to log where their ratio is not 2 to 1.
 
         It is logged once from task initialisation on, if two ticks in a row show it: a task that changes them writes
         one after the other. They are used as they are (decision).

@@ -1,7 +1,7 @@
 """The current minor loop: one scan at each interrupt of the 57C406, six in a line cycle (52.0).
 
-It knows neither the rack nor the plant: what it sees is ``Inputs`` and ``Measured``, what it gives an ``Outcome``.
-Given the same state and the same of both it does the same, so a recorded drive runs again without its plant.
+It depends neither on the rack nor on the plant: it reads ``Inputs`` and ``Measured`` and returns an ``Outcome``.
+The same state, inputs and measurements give the same outcome, so a recorded drive can run again without its plant.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from automax_ros.drive.current_loop.signals import (
 _REGISTERS: Final = {
     name: Measured._field_defaults[name] for name in ("tach_threshold", "phase_step", "period_step", "options")
 }
-"""The registers of the 57C406 at task initialisation (52.7): what they were before does not count."""
+"""The registers of the 57C406 at task initialisation (52.7), whatever they were before."""
 
 
 _SCR_TEST: Final = Phase.SCR_TEST
@@ -43,13 +43,13 @@ _new = tuple.__new__
 
 
 class Outcome(NamedTuple):
-    """What a scan gives.
+    """The result of a scan.
 
     Attributes:
-        command: for the 57C406.
+        command: the command for the 57C406.
         outputs: values in the order of ``OUTPUTS`` at a system clock tick, None between two.
         record: I_FDBK, REF_LAG_OUT and gate word for DIAG_DATA, None where none is written (52.3.2).
-        problems: numbers of what is logged (``AMX7xxx``).
+        problems: numbers of the problems to log (``AMX7xxx``).
         initialised: whether this scan was the task's first: the registers of the 57C406 get their defaults.
     """
 
@@ -66,12 +66,12 @@ class CurrentMinorLoop(Stateful):
     _kept = ("_started", "_tick")
 
     def __init__(self, *, tests_scrs: bool = False) -> None:
-        """Begin as before task initialisation."""
+        """Create the loop as before task initialisation."""
         self._tests_scrs = tests_scrs
         self.restart()
 
     def restart(self) -> None:
-        """The task is put into RUN: the next scan is its first; no fault is remembered (decision)."""
+        """Prepare for RUN of the task: the next scan is its first; no fault is remembered (decision)."""
         self._started = False
         self._tick = -1
         self.outputs = Outputs()
@@ -101,8 +101,8 @@ class CurrentMinorLoop(Stateful):
 
         Args:
             now_ns: its instant, ns of rack time.
-            measured: what the 57C406 tells.
-            inputs: what the task has latched.
+            measured: the measurements of the 57C406.
+            inputs: the values that the task has latched.
         """
         first = not self._started
         problems = self._start(inputs) if first else []
@@ -127,7 +127,7 @@ class CurrentMinorLoop(Stateful):
         pulses = self._fire(measured)
         block = sequence.phase < _RUN or self.control.block
         ok = self.latched.usable and not self.faults.active
-        # Named tuples are made as tuples are: their own way takes twice the time.
+        # Named tuples are created by tuple's constructor: their own takes twice the time.
         values = pll.next_ns, sequence.relays, pulses, self.latched.ioc_thresh, block, ok
         row = self._row(measured) if ticked else None
         told = tuple(problems) if problems else ()
@@ -149,11 +149,11 @@ class CurrentMinorLoop(Stateful):
         return problems
 
     def _judge(self, measured: Measured) -> int:
-        """Return what the shorted SCR test says."""
+        """Return the result of the shorted SCR test."""
         return self.scr_test.judge(measured, reverse=_reverse(measured))
 
     def _protect(self, measured: Measured, causes: int, verdict: int) -> list[int]:
-        """Latch faults; with one, without the permissive, or by CML_COAST_STOP the drive coasts; return problems."""
+        """Latch faults; coast on a fault, without the permissive, or by CML_COAST_STOP; return the problems to log."""
         faults, sequence = self.faults, self.sequence
         problems = faults.blame(verdict) if verdict > PASSED else []
         if causes:
@@ -175,7 +175,7 @@ class CurrentMinorLoop(Stateful):
             faults.reset(causes)
 
     def _go_on(self, now_ns: int, inputs: Inputs, verdict: int) -> list[int]:
-        """Take the next step of a start or stop where it is time; return the problems to log."""
+        """Execute the next step of a start or stop when it is due; return the problems to log."""
         latched, sequence = self.latched, self.sequence
         if sequence.closed(now_ns) and self._tests_scrs:
             sequence.test(now_ns)
@@ -196,7 +196,7 @@ class CurrentMinorLoop(Stateful):
         return problems
 
     def _fire(self, measured: Measured) -> tuple[Pulse, ...]:
-        """Plan the gates up to the next interrupt, as the regulator or the test in use has them."""
+        """Plan the gates up to the next interrupt, by the regulator or the test in use."""
         pll, latched, phase, control = self.pll, self.latched, self.sequence.phase, self.control
         reverse = _reverse(measured)
         if phase < _RUN:
@@ -236,10 +236,10 @@ class CurrentMinorLoop(Stateful):
             return None
         return self.outputs.i_fdbk, self.outputs.ref_lag_out, gates_of(pulses, self.pll.next_ns)
 
-    # What is kept
+    # State
 
     def numbers(self) -> list[float]:
-        """Return all that the future depends on as numbers, always as many (``NUMBERS``)."""
+        """Return the whole state as numbers, always ``NUMBERS`` of them."""
         values: list[float] = []
         for part in (self, *self._parts):
             for name in part._kept:
@@ -248,10 +248,10 @@ class CurrentMinorLoop(Stateful):
         return values
 
     def take(self, numbers: Numbers[float]) -> None:
-        """Take over what ``numbers`` gave.
+        """Restore the state that ``numbers`` returned.
 
         Raises:
-            ValueError: they are not as many.
+            ValueError: there are more or fewer than ``NUMBERS``.
         """
         if len(numbers) != NUMBERS:
             raise ValueError(f"a drive's loop has {NUMBERS} numbers, not {len(numbers)}")
@@ -266,7 +266,7 @@ class CurrentMinorLoop(Stateful):
 
 
 def _reverse(measured: Measured) -> bool:
-    """Return whether the SCRs are fired in the order of the rotation that is not standard: the line's own."""
+    """Return whether the SCRs are fired in the order of the non-standard rotation: as the line rotates."""
     return bool(measured.status & ROTATION_ABC)
 
 
@@ -278,4 +278,4 @@ def _like(old: object, number: float) -> object:
 
 
 NUMBERS: Final = len(CurrentMinorLoop().numbers())
-"""How many numbers the state of a loop is."""
+"""Count of the numbers in the state of a loop."""

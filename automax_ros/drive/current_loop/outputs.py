@@ -1,8 +1,7 @@
-"""The outputs of DC_DRIVE_CML in the order of its declaration (52.1.6, 52.2), DIAG_DATA left out.
+"""The outputs of DC_DRIVE_CML in the order of its declaration (52.1.6, 52.2), and the array DIAG_DATA apart from them.
 
-DIAG_DATA: where the current minor loop writes the record of a scan in the array of two pages (52.3.2, table 2).
-
-The array is dimensioned (37,1): 38 rows of two columns, a column is a page. Element (row, page) has the index
+In DIAG_DATA, an array of two pages, the current minor loop writes the records of scans (52.3.2, table 2). The array is
+dimensioned (37,1): 38 rows of two columns, a column is a page. Element (row, page) has the index
 ``row * 2 + page``. Row 0 of page 0 is PAGE_NUMBER, row 1 of a page its NEXT_ENTRY. Record n, 1 to 12, stands in the
 rows 3n - 1, 3n and 3n + 1: I_FDBK, REF_LAG_OUT, gate command word (decision: table 2 is not printed legibly; 2 + 12 x 3
 rows are all there are).
@@ -20,7 +19,7 @@ from automax_ros.drive.current_loop.signals import Pulse
 
 @dataclass
 class Outputs(Stateful):
-    """What the block shows; the loop keeps it up to date, and the task writes it at each system clock tick."""
+    """The outputs of the block; the loop keeps them up to date, and the task writes them at each system clock tick."""
 
     dc_cml_state: bool = False
     sync_locked: bool = False
@@ -63,10 +62,10 @@ PAGES: Final = 2
 SIZE: Final = ROWS * PAGES
 """Elements of the array."""
 PAGE_NUMBER: Final = 0
-"""Index of the element that says which page is written: 0 is page 0, anything else page 1."""
+"""Index of the element that selects the page to write: 0 is page 0, any other value page 1."""
 
 Record = tuple[int, int, int]
-"""I_FDBK, REF_LAG_OUT and the gates that are to be pulsed for the feedback of the next scan."""
+"""I_FDBK, REF_LAG_OUT and the gates to be pulsed for the feedback of the next scan."""
 
 
 def page_of(page_number: int) -> int:
@@ -80,7 +79,7 @@ def next_entry_index(page: int) -> int:
 
 
 def writes(page: int, next_entry: int, record: Record) -> tuple[tuple[int, int], ...]:
-    """Return what to write for a record: (index, value) of its three words, then of NEXT_ENTRY.
+    """Return the writes for a record: (index, value) of its three words, then of NEXT_ENTRY.
 
     Args:
         page: 0 or 1.
@@ -95,11 +94,11 @@ def writes(page: int, next_entry: int, record: Record) -> tuple[tuple[int, int],
 
 
 def gates_of(pulses: tuple[Pulse, ...], next_ns: int) -> int:
-    """Return the gates that are to be pulsed from an interrupt to the next, as bits: 0 where none is (52.3.2).
+    """Return the gates to be pulsed from an interrupt to the next, as bits: 0 where none is (52.3.2).
 
     Args:
         pulses: the gate windows of a command.
-        next_ns: time to the next interrupt, ns; what begins later counts for a later record.
+        next_ns: time to the next interrupt, ns; a window that begins later belongs to a later record.
     """
     gates = 0
     for after_ns, _, word in pulses:

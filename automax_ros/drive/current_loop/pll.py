@@ -1,10 +1,10 @@
-"""The phase locked loop: when interrupts come, and whether they keep step with the line (52.5).
+"""The phase locked loop: the instants of the interrupts, and their synchronism with the line (52.5).
 
 An interrupt comes at each sixth of a line cycle, where phase T1 is at its maximum and each 60 degrees after it: the
 instants of natural commutation (decision). At first, and after a loss, two maxima of T1 give period and phase
-(decision). From then on, once per cycle, at position 0, the loop sees how far T1's maximum lies from where it was
-expected, and moves the phase by all of it and the period by half of it, at most by the registers 4137 and 4138. So a
-phase step above the largest error, 2000 us, changes nothing (52.5.1), and the phase needs twice the period's step
+(decision). From then on, once per cycle, at position 0, the loop measures the distance of T1's maximum from its
+expected place, and moves the phase by all of it and the period by half of it, at most by the registers 4137 and 4138.
+So a phase step above the largest error, 2000 us, changes nothing (52.5.1), and the phase needs twice the period's step
 (decision). Registers of another ratio are used as they are (decision).
 """
 
@@ -32,8 +32,8 @@ class Pll(Stateful):
 
     Attributes:
         locked: whether it has locked.
-        period_ns: period of the line as the loop has it, ns.
-        position: which sixth of the cycle begins at the present interrupt, 0 at T1's maximum.
+        period_ns: the loop's period of the line, ns.
+        position: the sixth of the cycle that begins at the present interrupt, 0 at T1's maximum.
         error_ns: the last phase error, ns; positive where the line is late.
         next_ns: time from the present interrupt to the next, ns.
     """
@@ -44,7 +44,7 @@ class Pll(Stateful):
     )  # fmt: skip
 
     def __init__(self) -> None:
-        """Begin unlocked, without a line."""
+        """Create the loop, unlocked and without a line."""
         self.locked = False
         self.period_ns = 16_666_667
         self.position = 0
@@ -55,7 +55,7 @@ class Pll(Stateful):
         self._forget()
 
     def _forget(self) -> None:
-        """Look for T1's maxima from here on."""
+        """Search for T1's maxima from now on."""
         self._passed_ns = self._since_ns = 0
         self._maximum_ns = NEVER
 
@@ -65,7 +65,7 @@ class Pll(Stateful):
         return (self.period_ns + 500) // 1000
 
     def start(self, line_hz: int) -> None:
-        """Begin at a nominal frequency, Hz."""
+        """Start at a nominal frequency, Hz."""
         self.__init__()  # type: ignore[misc]
         self.period_ns = 1_000_000_000 // line_hz
         self.next_ns = self.period_ns // 6
@@ -101,7 +101,7 @@ class Pll(Stateful):
         self.period_ns = max(SHORTEST_NS, min(LONGEST_NS, period_ns))
 
     def _look(self, since_ns: int) -> None:
-        """Wait for two maxima of T1; then put the next interrupt on a natural commutation."""
+        """Wait for two maxima of T1, then set the next interrupt to a natural commutation."""
         self._passed_ns += self.next_ns
         maximum_ns = self._passed_ns - since_ns
         if since_ns < self._since_ns:

@@ -1,6 +1,6 @@
-"""Gains for a motor and its line: what to program into DC_DRIVE_CML (52.1.2).
+"""Proposed gains of DC_DRIVE_CML for a motor and its line (52.1.2).
 
-Each takes the drive's data and LIM_BAR; the result lies in the keyword's range and steps.
+Each is computed from the drive's data and LIM_BAR; the result is in the keyword's range and steps.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from automax_ros.drive.current_loop.regulator import BOUNDARY_WAY, FULL, INTEGRA
 VD0: Final = 1.3505
 """Ideal mean voltage of the bridge over the line-to-line voltage: 3 sqrt(2) / pi."""
 BOUNDARY: Final = 0.0931
-"""Part of Vd0 / (w L) that is the current at the boundary of continuous conduction, at alpha 90 degrees and R = 0."""
+"""Current at the boundary of continuous conduction over Vd0 / (w L), at alpha 90 degrees and R = 0."""
 LOOP_GAIN: Final = 0.65
 """Part of an error that the proportional gain corrects in a scan, in continuous conduction at alpha 90 degrees
 (decision)."""
@@ -25,14 +25,14 @@ LEAST_CONDUCTION: Final = 0.4
 
 @dataclass(frozen=True)
 class Circuit:
-    """What the gains depend on.
+    """The data that the gains depend on.
 
     Attributes:
         line_v: line-to-line voltage, V rms.
         line_hz: frequency, Hz.
-        inductance_h: inductance in the current's way: armature, choke and two phases of the line, H.
+        inductance_h: inductance in the current's path: armature, choke and two phases of the line, H.
         resistance_ohm: resistance there, with the overlap's 6 f Ls, ohm.
-        counts_a: counts of feedback an ampere: 4095 at LIM_BAR.
+        counts_a: counts of feedback per ampere: 4095 at LIM_BAR.
     """
 
     line_v: float
@@ -45,7 +45,7 @@ class Circuit:
 def circuit_of(
     parameters: DriveParameters, lim_bar: int, *, choke_h: float = 0.0, source_ohm: float = 0.005
 ) -> Circuit:
-    """Return what the gains of a drive depend on.
+    """Return the data that the gains of a drive depend on.
 
     Args:
         parameters: motor and line.
@@ -64,12 +64,12 @@ def circuit_of(
 
 
 def gain_continuous(circuit: Circuit) -> float:
-    """Counts that a microsecond of DELTA adds in a scan, in continuous conduction: pi / 3 Vd0 1e-6 / L x counts_a."""
+    """Return the counts that 1 us of DELTA adds in a scan, in continuous conduction: pi / 3 Vd0 1e-6 / L x counts_a."""
     return pi / 3 * VD0 * circuit.line_v * 1e-6 / circuit.inductance_h * circuit.counts_a
 
 
 def kp(circuit: Circuit) -> float:
-    """KP = 0.65 / (counts of a microsecond and scan), in steps of 1/1024, 0 to 4."""
+    """KP = 0.65 / (counts per microsecond of DELTA and scan), in steps of 1/1024, 0 to 4."""
     return min(4.0, max(1.0, round(LOOP_GAIN / gain_continuous(circuit) * STEPS)) / STEPS)
 
 

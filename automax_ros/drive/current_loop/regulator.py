@@ -1,16 +1,14 @@
-"""The current regulator: P + I with gains that follow the conduction time (52.1.2, 52.2.1).
+"""The reference chain, rate limit then lag, and the P + I current regulator (52.1.2, 52.2.1).
 
-Published are the end points alone. In continuous conduction the integral gain is KP x PI_W_LEAD x the scan's time
-(decision). The proportional part takes into account what its last push has not shown yet in the mean of a scan: an SCR
-is fired up to a scan after the interrupt (decision). In discontinuous conduction the current depends on DELTA
-alone, with the cube of the part of the scan that conducts: the integral gain is what takes off ``INTEGRAL_STEP`` of an
-error in a scan, at most AG_FACTOR times the continuous one (decision). While nothing conducts, DELTA moves by steps
-(decision).
+The regulator's gains follow the conduction time; only their end points are published. In continuous conduction the
+integral gain is KP x PI_W_LEAD x the scan's time (decision). The proportional part allows for the share of its last
+push that the mean of a scan does not show yet: an SCR is fired up to a scan after the interrupt (decision). In
+discontinuous conduction the current depends on DELTA alone, with the cube of the part of the scan that conducts: the
+integral gain is the one that corrects ``INTEGRAL_STEP`` of an error in a scan, at most AG_FACTOR times the continuous
+one (decision). While nothing conducts, DELTA moves by steps (decision).
 
-Where a scan computes for a time, as in modeled execution, the 57C406 fires by the DELTA before meanwhile. The loop
-knows how long that was, and reckons with what it has commanded and does not see yet: it keeps its damping (decision).
-
-The reference chain: rate limit, then lag (52.1.2).
+Where a scan computes for a time, as in modeled execution, the 57C406 fires with the previous DELTA meanwhile. The loop
+knows how long that was, and allows for commands whose effect it has not measured yet: it keeps its damping (decision).
 """
 
 from __future__ import annotations
@@ -35,15 +33,15 @@ class ReferenceChain(Stateful):
     _kept = ("rate_out", "lag_out")
 
     def __init__(self) -> None:
-        """Begin at 0."""
+        """Create the chain at 0."""
         self.rate_out = self.lag_out = 0.0
 
     def begin(self) -> None:
-        """Begin at 0 again."""
+        """Start at 0 again."""
         self.rate_out = self.lag_out = 0.0
 
     def scan(self, reference: int, rate_s: float, lag_rad_s: float, interval_s: float) -> float:
-        """Move on by a scan and return the lag's output.
+        """Execute a scan and return the lag's output.
 
         Args:
             reference: counts.
@@ -75,7 +73,7 @@ LARGEST_GAIN: Final = 32767
 BOUNDARY_WAY: Final = 1 / 12
 """From the first current to continuous conduction DELTA moves by about this part of a period (decision)."""
 INTEGRAL_STEP: Final = 0.55
-"""Part of an error that the integral takes off in a scan, in discontinuous conduction (decision)."""
+"""Part of an error that the integral corrects in a scan, in discontinuous conduction (decision)."""
 LEAST_PART: Final = 0.05
 """Conducting part of a scan below which the integral gain rises no more (decision)."""
 RAISED: Final = 0.13
@@ -83,11 +81,12 @@ FALL: Final = 0.88
 """After discontinuous conduction the continuous integral gain is greater by this part of an error, which falls by this
 factor each scan: the drop over the resistance comes with the current (decision)."""
 RISE: Final = 0.30
-"""DELTA rises in a scan by at most this part of a scan in discontinuous conduction, or what conducts would not tell
-(decision)."""
+"""Largest rise of DELTA in a scan of discontinuous conduction, as part of a scan: with a larger one the conducting part
+would not show the effect (decision)."""
 LATE_RAISED: Final = 0.05
 LATE_RISE: Final = 0.15
-"""RAISED and RISE where commands come after their interrupt: what conducts tells a scan later (decision)."""
+"""RAISED and RISE where commands come after their interrupt: the conducting part shows the effect a scan later
+(decision)."""
 AHEAD: Final = 0.4
 """Part of the last proportional push that the mean of a scan does not show if the SCR is fired at the scan's end
 (decision)."""
@@ -110,26 +109,26 @@ class Regulator(Stateful):
         push_us: the proportional part, us.
         delta_us: DELTA of the last scan, us.
         before_us: DELTA of the scan before that, us.
-        raised: what is left of the raised integral gain, us a count and scan.
+        raised: rest of the raise of the integral gain, us per count and scan.
         fdbk_gain: FDBK_GAIN of the last scan.
-        integral_gain: INTEGRAL_GAIN of the last scan: us of DELTA a count of error and scan, in 1/1024.
+        integral_gain: INTEGRAL_GAIN of the last scan: us of DELTA per count of error and scan, in 1/1024.
     """
 
     _kept = ("integral_us", "push_us", "delta_us", "before_us", "raised", "fdbk_gain", "integral_gain")
 
     def __init__(self) -> None:
-        """Begin at DELTA 0."""
+        """Create the regulator at DELTA 0."""
         self.late = self.missed = False
         self.begin(0.0)
         self.fdbk_gain = self.integral_gain = 0
 
     def begin(self, delta_us: float) -> None:
-        """Begin at a DELTA, us."""
+        """Start at a DELTA, us."""
         self.integral_us = self.delta_us = self.before_us = delta_us
         self.push_us = self.raised = 0.0
 
     def feedback(self, counts: float, part: float) -> int:
-        """Return I_FDBK, counts: the mean current of the scan, limited as the raw signal is.
+        """Return I_FDBK, counts: the mean current of the scan, limited like the raw signal.
 
         Args:
             counts: the mean current.
@@ -140,7 +139,7 @@ class Regulator(Stateful):
         return round(limit if counts > limit else -limit if counts < -limit else counts)
 
     def see_late(self, late_us: int, period_us: float) -> None:
-        """See whether the DELTA of the last scan came too late for that scan's pulse: the one before has fired it.
+        """Determine whether the last scan's DELTA came too late for that scan's pulse: the previous one has fired it.
 
         Args:
             late_us: how long after the interrupt it came.
@@ -151,7 +150,7 @@ class Regulator(Stateful):
         self.missed = self.late and fired_us <= late_us
 
     def search(self, error: float, kp: float, wanted: float, period_us: float) -> None:
-        """Move DELTA on by a step while nothing conducts: the greater the reference (over LIM_BAR), the faster."""
+        """Raise DELTA by a step while nothing conducts: the greater the reference (over LIM_BAR), the larger."""
         step = (SEARCH_LEAST + (SEARCH_MOST - SEARCH_LEAST) * min(1.0, wanted)) * period_us
         self.before_us = self.delta_us
         self.delta_us = min(self.delta_us + step, 0.5 * period_us)
@@ -159,12 +158,12 @@ class Regulator(Stateful):
         self.integral_us = self.delta_us - self.push_us
 
     def continuous(self, error: float, kp: float, gain: float, period_us: float, lowest_us: float) -> None:
-        """Move on by a scan in which current flowed all the time.
+        """Execute a scan after one in which current flowed all the time.
 
         Args:
             error: counts, positive where the bridge in use must carry more.
-            kp: KP, us a count.
-            gain: integral gain, us a count and scan.
+            kp: KP, us per count.
+            gain: integral gain, us per count and scan.
             period_us: the line's period.
             lowest_us: least DELTA.
         """
@@ -175,7 +174,7 @@ class Regulator(Stateful):
         unseen_us = AHEAD * fired * self.push_us
         if self.late and kp > 0.0:
             pending_us = fired * self.push_us
-            if self.missed:  # the push before is where the last one would be, and that is still to come as a whole
+            if self.missed:  # the push before takes effect in place of the last one, which is still to come as a whole
                 pending_us = self.push_us + fired * (self.before_us - self.integral_us)
             error -= PENDING * pending_us / kp
             unseen_us = 0.0
@@ -185,12 +184,12 @@ class Regulator(Stateful):
     def discontinuous(
         self, error: float, kp: float, gain: float, factor: float, thresh: int, part: float, period_us: float
     ) -> None:
-        """Move on by a scan in which no current flowed for a part of the time.
+        """Execute a scan after one in which no current flowed for a part of the time.
 
         Args:
             error: counts, positive where the bridge in use must carry more.
-            kp: KP, us a count.
-            gain: integral gain in continuous conduction, us a count and scan.
+            kp: KP, us per count.
+            gain: integral gain in continuous conduction, us per count and scan.
             factor: AG_FACTOR.
             thresh: CC_THRESH, counts; 0 leaves the integral gain as it is.
             part: the part of the scan that conducted, below 1.
@@ -209,18 +208,18 @@ class Regulator(Stateful):
         self.push_us = kp * error
         rise = RISE if not self.late else LATE_RISE
         self._move(gain, move, 0.0, min(0.5, self.delta_us / period_us + rise / 6.0) * period_us)
-        # AHEAD is of a push in continuous conduction, PENDING of all that drives the current up.
+        # AHEAD applies to a push in continuous conduction, PENDING to all that drives the current up.
         self.push_us = max(0.0, self.delta_us - self.integral_us) if self.late else 0.0
 
     def slow(self, error: float, kp: float, lowest_us: float, highest_us: float) -> None:
-        """Move on by a scan of a cycle in which pulses are missing: by the mean error of the cycle, counts, alone."""
+        """Execute a scan of a cycle in which pulses are missing, with the mean error of the cycle in counts."""
         self._move(SLOW_MOVE * kp, SLOW_MOVE * kp * error, lowest_us, highest_us)
         self.push_us = 0.0
         delta = self.integral_us + SLOW_PUSH * kp * error
         self.delta_us = lowest_us if delta < lowest_us else highest_us if delta > highest_us else delta
 
     def _move(self, gain: float, move_us: float, lowest_us: float, highest_us: float) -> None:
-        """Move the integrator, and find DELTA between two bounds."""
+        """Move the integrator, and compute DELTA between two bounds."""
         shown = int(gain * STEPS + 0.5)
         self.integral_gain = shown if shown < LARGEST_GAIN else LARGEST_GAIN
         integral = self.integral_us + move_us

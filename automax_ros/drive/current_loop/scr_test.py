@@ -1,15 +1,15 @@
 """The shorted SCR diagnostic: one gate fired alone, at a DELTA that grows from cycle to cycle (52.3.1).
 
-An SCR that is fired alone finds no way back but through a shorted leg. Fired DELTA before alpha 180 degrees, its phase
-stands above the one that it takes over from by sqrt(2) V sin(DELTA), and stays there up to the next interrupt, where
-the current is greatest. So each gate that is fired meets three legs, and currents of line and armature at that
-interrupt say which of them is shorted (decision: nothing is published but the numbers):
+The current of an SCR that is fired alone has no return path but a shorted leg. When it is fired DELTA before alpha
+180 degrees, its phase is above the one that it takes over from by sqrt(2) V sin(DELTA), and stays above it up to the
+next interrupt, where the current is greatest. So each gate that is fired meets three legs, and currents of line and
+armature at that interrupt say which of them is shorted (decision: nothing is published but the numbers):
 
 - current in the line, none in the armature: the leg of the SCR that it takes over from, two places before it. The
-  source's inductance limits this current, whatever the motor does: it finds every short, at standstill and at speed.
+  source's inductance limits this current, whatever the motor does: every short is found, at standstill and at speed.
 - current in line and armature: the leg of the next SCR, one place after it.
-- current in the armature alone: the other leg of its own phase, three places after it. It needs an EMF that drives
-  it: a motor that turns backwards.
+- current in the armature alone: the other leg of its own phase, three places after it. This current needs an EMF that
+  drives it: a motor that turns backwards.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from automax_ros.drive.current_loop.signals import RATED, Measured, Pulse, gate_
 CYCLES: Final = 9
 """Line cycles for which a bridge is tested (52.3.1)."""
 STEP_NS: Final = 100_000
-"""How much DELTA grows from cycle to cycle, ns: 0 to 800 us (decision: equal steps)."""
+"""Increase of DELTA from cycle to cycle, ns: 0 to 800 us (decision: equal steps)."""
 PULSE_NS: Final = 100_000
 """Length of the gate pulse, ns (decision)."""
 THRESHOLD: Final = RATED * 5 // 100
@@ -35,12 +35,12 @@ PASSED: Final = 0
 
 
 class ScrTest(Stateful):
-    """One test of the SCRs, from ``begin`` on a scan at each interrupt; ``bridges`` is how many bridges it fires."""
+    """One test of the SCRs, from ``begin`` on with a scan at each interrupt; ``bridges`` is the number of bridges."""
 
     _kept = ("bridges", "_scan", "_fired")
 
     def __init__(self) -> None:
-        """Begin as before a test."""
+        """Create the test, not begun."""
         self.bridges = 1
         self._scan = self._fired = 0
 
@@ -62,12 +62,12 @@ class ScrTest(Stateful):
         return PASSED if self._scan >= self.bridges * CYCLES * 6 else GO_ON
 
     def fire(self, position: int, period_ns: int, *, reverse: bool, late: bool = False) -> tuple[Pulse, ...]:
-        """Fire the next gate; arguments as those of ``Firing.pulses``; ``late``: commands come after interrupts."""
+        """Fire the next gate; arguments as for ``Firing.pulses``; ``late``: commands come after interrupts."""
         cycle = self._scan // 6
         delta_ns = STEP_NS * (cycle % CYCLES)
-        if late and not delta_ns:  # a pulse at the interrupt would be over when the command comes
+        if late and not delta_ns:  # a pulse at the interrupt would have ended when the command comes
             delta_ns = PULSE_NS
-        # Alpha 180 of what is fired is this interrupt without a DELTA, else the next one.
+        # Alpha 180 of the fired SCR is at this interrupt without a DELTA, else at the next one.
         place = position + 4 if delta_ns else position + 3
         self._fired = (REVERSED if reverse else STANDARD)[place % 6] + 10 * (cycle // CYCLES)
         self._scan += 1
@@ -76,7 +76,7 @@ class ScrTest(Stateful):
 
 
 def _suspect(measured: Measured) -> int | None:
-    """Return how many places after the fired SCR the shorted leg stands, None without a short."""
+    """Return how many places after the fired SCR the shorted leg is, None without a short."""
     armature = measured.tail_us == 0
     if measured.line >= THRESHOLD:
         return 1 if armature else -2
@@ -84,7 +84,7 @@ def _suspect(measured: Measured) -> int | None:
 
 
 def _pair(fired: int, places: int, reverse: bool) -> int:
-    """Return the pair, by its SCR of bridge 1, of the SCR that stands some places after one of the same bridge."""
+    """Return the pair, by its SCR of bridge 1, of the SCR some places after another of the same bridge."""
     order = REVERSED if reverse else STANDARD
     number = order[(order.index(fired % 10) + places) % 6]
     return number if fired < 10 else PARTNER[number + 10]

@@ -1,7 +1,7 @@
 """Start, stop and coast stop of the drive (52.1.3, 52.3.1).
 
 A start is the rising edge of CML_RUN, seen at a system clock tick in standby while nothing forbids it; an edge that
-comes at another time is forgotten, and not logged (decision). The first tick after task initialisation shows no edge.
+comes at another time is forgotten, and not logged (decision). The first tick after task initialisation has no edge.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ CLOSE_NS: Final = 30_000_000
 
 
 class Phase(enum.IntEnum):
-    """Where the drive is between standby and run."""
+    """The phase of the drive between standby and run."""
 
     STANDBY = 0
     CLOSING = 1
@@ -38,14 +38,14 @@ class Sequence(Stateful):
     """The state machine.
 
     Attributes:
-        phase: where the drive is.
-        relays: which contactor relays are on.
+        phase: the drive's phase.
+        relays: the contactor relays that are on.
     """
 
     _kept = ("phase", "relays", "_since_ns", "_run_before")
 
     def __init__(self) -> None:
-        """Begin in standby."""
+        """Create the sequence in standby."""
         self.phase = Phase.STANDBY
         self.relays = 0
         self._since_ns = 0
@@ -75,7 +75,7 @@ class Sequence(Stateful):
             self.coast()
 
     def closed(self, now_ns: int) -> bool:
-        """Return whether the contactor has had the time to close."""
+        """Return whether the closing time of the contactor has passed."""
         return self.phase is Phase.CLOSING and now_ns - self._since_ns >= CLOSE_NS
 
     def test(self, now_ns: int) -> None:
@@ -83,11 +83,11 @@ class Sequence(Stateful):
         self._enter(Phase.SCR_TEST, now_ns)
 
     def run(self, now_ns: int) -> None:
-        """Begin to run."""
+        """Start to run."""
         self._enter(Phase.RUN, now_ns)
 
     def stopped(self, now_ns: int, *, dropout_s: float, discontinuous: bool) -> bool:
-        """Return whether a stop may open the contactor: the current is discontinuous, or MAX_M_DROPOUT is over."""
+        """Return whether a stop may open the contactor: the current is discontinuous, or MAX_M_DROPOUT has passed."""
         if self.phase is not Phase.STOPPING:
             return False
         return discontinuous or now_ns - self._since_ns >= dropout_s * 1e9

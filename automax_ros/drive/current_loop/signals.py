@@ -1,7 +1,7 @@
-"""What passes between the current minor loop and its 57C406: whole numbers only, so that a record keeps them exactly.
+"""Data between the current minor loop and its 57C406: whole numbers only, so that a record keeps them exactly.
 
-The 57C406 interrupts six times in a line cycle. At each interrupt it gives what it has ``Measured`` since the one
-before, and takes a ``Command`` for the time up to the next (decision: nothing is published of this interface).
+The 57C406 interrupts six times in a line cycle. At each interrupt it supplies what it has ``Measured`` since the
+previous one, and receives a ``Command`` for the time up to the next (decision: nothing is published of this interface).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 LINE: Final = 1 << 0
-"""There is a sync voltage: the phase that the 57C406 synchronizes on is alive."""
+"""There is a sync voltage: the phase to which the 57C406 synchronizes is live."""
 ROTATION_ABC: Final = 1 << 1
 """The phases pass in the order A, B, C: not the standard one, which is C, B, A (52.1.5)."""
 OVERCURRENT: Final = 1 << 2
@@ -26,17 +26,18 @@ SWITCH_B: Final = 1 << 6
 RESET_SWITCH: Final = 1 << 7
 """The fault reset switch of the 57C406 is closed."""
 VOLTAGE: Final = 1 << 8
-"""A 57C405 gives the armature voltage."""
+"""A 57C405 supplies the armature voltage."""
 OVERSPEED: Final = 1 << 9
-"""The hardware's overspeed circuit, which DIGITAL_TACH sets up, has tripped since it was last told, or sees the speed
-above OSV_THRESH still (52.1.5)."""
+"""The hardware's overspeed circuit, which DIGITAL_TACH sets up, has tripped since the last report, or still measures a
+speed above OSV_THRESH (52.1.5)."""
 
 LATE_BIT: Final = 16
-"""From this bit of ``Measured.status`` on stands how long after its interrupt the last command came, us: the time that
-a scan computes, 0 in ideal execution."""
+"""First bit of the delay in ``Measured.status``, us: how long after its interrupt the last command came. That is the
+time that a scan computes, 0 in ideal execution."""
 
 LATEST_US: Final = 16_383
-"""Most of it that is told, us: the whole stays a number of 31 bits, and a command never comes so late in order."""
+"""Largest delay in ``Measured.status``, us: the status stays within 31 bits, and in normal operation no command comes
+that late."""
 
 RATED: Final = 100_000
 """The rated armature current in the units of ``Measured.current`` (thousandths of a percent)."""
@@ -46,26 +47,26 @@ VOLTS: Final = 10_000
 
 FMCR: Final = 1
 RMCR: Final = 2
-"""The contactor relays of the drive digital I/O module, as ``Command.relays`` has them."""
+"""The contactor relays of the drive digital I/O module, as bits of ``Command.relays``."""
 
 
 class Measured(NamedTuple):
-    """What the 57C406 has measured since the last interrupt, and how its inputs, switches and registers stand.
+    """The measurements of the 57C406 since the last interrupt, and the state of its inputs, switches and registers.
 
     Attributes:
         status: the bits above.
         current: mean armature current, thousandths of a percent of the rated one, signed.
-        zero_us: how long no current flowed, us.
-        tail_us: how long none has flowed up to this interrupt without a break, us; 0 while it flows.
+        zero_us: time without current, us.
+        tail_us: time without current up to this interrupt, without a break, us; 0 while it flows.
         since_sync_ns: time since phase T1 of the drive was last at its maximum, ns; 0 without LINE.
-        voltage: armature voltage over the drive's nominal line-to-line voltage, ``VOLTS`` for 1, signed, as the
-            scaling of 52.6.1 makes it, which follows the line; the EMF while no current flows; 0 without VOLTAGE.
+        voltage: armature voltage over the drive's nominal line-to-line voltage, ``VOLTS`` for 1, signed, scaled as in
+            52.6.1, which follows the line; the EMF while no current flows; 0 without VOLTAGE.
         tach_threshold: register 4136, degrees.
         phase_step: register 4137, us.
         period_step: register 4138, us.
         options: register 4146.
         line: the greatest phase current of the line at this interrupt, thousandths of a percent of the rated armature
-            current, without sign. It tells a short from phase to phase, which the armature does not see.
+            current, without sign. It shows a short from phase to phase, which the armature current does not.
     """
 
     status: int
@@ -93,14 +94,14 @@ class Pulse(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What the 57C406 shall do until the next interrupt.
+    """The command for the 57C406 until the next interrupt.
 
     Attributes:
         next_ns: time from this interrupt to the next, ns.
-        relays: which contactor relays are on, FMCR and RMCR.
-        pulses: the gate windows that begin before the next interrupt; those of earlier commands that have begun stay.
-            Where scans compute for a time one more follows, for the time until the next command.
-        level: current at which OVERCURRENT comes, % of rated.
+        relays: the contactor relays that are on, FMCR and RMCR.
+        pulses: the gate windows that begin before the next interrupt; those of earlier commands that have begun remain.
+            Where scans compute for a time, one more follows for the time until the next command.
+        level: current at which OVERCURRENT is set, % of rated.
     """
 
     next_ns: int

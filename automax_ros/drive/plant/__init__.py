@@ -1,1 +1,1 @@
-"""The plant of one drive, what can be done to it, and what its 57C406 measures and fires."""
+"""The plant of one drive, its verbs and signals, and the measuring and firing of its 57C406."""

@@ -1,6 +1,6 @@
-"""What the 57C406 does with a plant: it measures between interrupts and gives the gates what the loop commands.
+"""The 57C406's access to a plant: it measures between interrupts and fires the gates as the loop commands.
 
-No registers, no rack: ``rack/modules`` has the module around it, a bench or a PMI can do without one.
+It needs neither registers nor a rack: the module is in ``rack/modules``, and a bench or a PMI works without it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LEAST_SYNC: Final = 0.25
 """Part of the nominal line voltage below which there is no sync voltage (decision)."""
 TURN: Final = 2 * pi
 _new = tuple.__new__
-"""A named tuple made as tuples are: its own way takes twice the time."""
+"""Creates a named tuple by tuple's constructor: its own takes twice the time."""
 
 
 def _word(value: float) -> int:
@@ -50,10 +50,10 @@ def _gate_mask(word: int) -> int:
 
 
 class DriveController:
-    """Measures a plant at interrupts and carries out commands; without a plant there is no line."""
+    """Measures a plant at interrupts and executes commands; without a plant there is no line."""
 
     def __init__(self, plant: DrivePlant | None, full_rpm: float | None = None) -> None:
-        """Begin with gates off; ``full_rpm``: what the digital tachometer shows as 4095, None for base speed."""
+        """Create the controller with gates off; ``full_rpm``: speed of 4095 counts, None for the motor's base speed."""
         self.plant = plant
         self.overspeed = OverspeedCircuit(plant, full_rpm)
         self.level = 400
@@ -62,12 +62,12 @@ class DriveController:
         self._fired = (0, 0)
 
     def measure(self, now_ns: int, status: int = 0, registers: tuple[int, int, int, int] = (109, 4, 2, 0)) -> Measured:
-        """Let the plant's time pass to an interrupt and return what was measured since the one before.
+        """Advance the plant to an interrupt and return the measurements since the previous one.
 
         Args:
             now_ns: the instant, ns.
-            status: bits of inputs and switches; VOLTAGE where a 57C405 is wired to the armature. How late the last
-                command came is added.
+            status: bits of inputs and switches; VOLTAGE where a 57C405 is wired to the armature. The delay of the last
+                command is added.
             registers: 4136, 4137, 4138, 4146.
         """
         plant = self.plant
@@ -111,14 +111,14 @@ class DriveController:
         return _new(Measured, values)
 
     def command(self, command: Command, interrupt_ns: int, now_ns: int = 0) -> None:
-        """Carry out what the loop commands until the next interrupt: relays and gates.
+        """Execute the loop's command until the next interrupt: relays and gates.
 
-        A command that comes after its interrupt takes the place of the plan by which the gates went on meanwhile: what
-        should have begun since the interrupt begins at once, what that plan has fired already is not fired twice
+        A command that comes after its interrupt replaces the plan by which the gates continued meanwhile: pulses that
+        should have begun since the interrupt begin at once, those that the plan has already fired are not fired twice
         (decision: nothing is lost for computing time).
 
         Args:
-            command: what it commands.
+            command: the command.
             interrupt_ns: the instant of the interrupt, from which pulses count, ns.
             now_ns: the present where it is later, ns.
         """
@@ -152,26 +152,26 @@ class DriveController:
                 self._ahead = (on_ns, gates)
 
     def watch(self) -> bool:
-        """Let the overspeed circuit look at the plant's present; return whether it has tripped and was not told.
+        """Check the plant's present speed by the overspeed circuit; return whether it has an unreported trip.
 
-        As it trips gates and contactor are off, whatever the loop commands, or where none does.
+        When it trips, gates and contactor are off, whatever the loop commands, and also without a loop.
         """
         if self.overspeed.look():
             self._suppress()
         return self.overspeed.is_news
 
     def state(self) -> list[int]:
-        """Return what the future depends on, besides the plant."""
+        """Return the state, without that of the plant."""
         return [self.level, self.late_us, *self._ahead, *self._fired, *self.overspeed.state()]
 
     def load(self, state: Sequence[int]) -> None:
-        """Take over what ``state`` gave."""
+        """Restore what ``state`` returned."""
         self.level, self.late_us, ahead_ns, ahead, fired_ns, fired, *overspeed = state
         self._ahead, self._fired = (ahead_ns, ahead), (fired_ns, fired)
         self.overspeed.load(overspeed)
 
     def off(self, now_ns: int) -> None:
-        """Suppress all gates at an instant, ns, and turn the contactor's relay off: nobody commands any more."""
+        """Suppress all gates at an instant, ns, and turn the contactor's relay off: there are no more commands."""
         self.late_us = 0
         if self.plant is not None:
             self.plant.advance(now_ns)

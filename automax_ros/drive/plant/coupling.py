@@ -1,6 +1,6 @@
-"""Two motors on one shaft, or on two shafts with a spring or a gear between them; each fed by a circuit of its own.
+"""Two motors on one shaft, or on two shafts with a spring or a gear between them, each fed by its own circuit.
 
-Two plants whose shafts are coupled: whoever looks at one of them lets the time of both pass.
+Plants whose shafts are coupled advance together: advancing one of them advances both.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ LONGEST_SLICE_NS = 1_000_000
 
 
 class Coupling(Stateful):
-    """Lets two circuits pass time together, in slices after which their motors exchange torque.
+    """Advances two circuits together, in slices after which their motors exchange torque.
 
     Attributes:
         twist_rad: angle of the first motor ahead of the second's times the ratio, rad; 0 on a stiff shaft.
         torque_n_m: torque that the shaft carries from the first motor to the second, N m, at the first.
 
-    Its state is the shaft's alone: the two circuits have their own.
+    Its state is that of the shaft only: the two circuits have their own.
     """
 
     _kept = ("twist_rad", "torque_n_m")
@@ -40,7 +40,7 @@ class Coupling(Stateful):
         damping_n_m_s: float = 0.0,
         ratio: float = 1.0,
     ) -> None:
-        """Couple two motors; stiff ones begin at their common speed.
+        """Couple two motors; stiffly coupled ones start at their common speed.
 
         Args:
             first: a circuit with a Motor.
@@ -63,13 +63,13 @@ class Coupling(Stateful):
             self._become_one(one, two)
         else:
             require("stiffness of the coupling in N m/rad", stiffness_n_m_rad, 0.0, above=True)
-            # A twentieth of a radian of the shaft's own oscillation and of the damper's decay.
+            # A twentieth of a radian of the shaft's oscillation, and of the damper's time constant.
             swing = swing_rad_s(one, two, stiffness_n_m_rad, ratio)
             decay = self._damping * _compliance(one, two, ratio)
             self.slice_ns = max(1000, min(self.slice_ns, round(0.05e9 / max(swing, decay, 1e-9))))
 
     def _become_one(self, one: Motor, two: Motor) -> None:
-        """Let each motor turn the inertia of both, at the speed that their momentum gives."""
+        """Give each motor the inertia of both, at the speed of their common momentum."""
         if one.held or two.held:
             raise ParameterError("a shaft that is held at a speed cannot be coupled stiffly: give it a stiffness")
         ratio, inertia = self._ratio, two.inertia_kg_m2 / self._ratio**2
@@ -80,7 +80,7 @@ class Coupling(Stateful):
         one.inertia_kg_m2, two.inertia_kg_m2 = whole, whole * ratio**2
 
     def advance(self, until_ns: int) -> None:
-        """Let both circuits pass time to an instant, ns."""
+        """Advance both circuits to an instant, ns."""
         now = self.first.now_ns
         while now < until_ns:
             now = min(until_ns, now + self.slice_ns)
@@ -90,7 +90,7 @@ class Coupling(Stateful):
                 self._elastic_slice(now)
 
     def _stiff_slice(self, until_ns: int) -> None:
-        """Let each motor turn the whole inertia with its own torque and what the other's was; then add both."""
+        """Advance each motor with the whole inertia, its own torque and the other's last one; then add both."""
         one, two, ratio = self._one, self._two, self._ratio
         time_s = (until_ns - self.first.now_ns) * 1e-9
         began = one.speed_rad_s
@@ -102,11 +102,11 @@ class Coupling(Stateful):
         one.acceleration = impulse / one.inertia_kg_m2 / time_s
         two.acceleration = one.acceleration / ratio
         one.coupling_n_m, two.coupling_n_m = second / ratio / time_s, first * ratio / time_s
-        # What the first does not need to turn its own part goes to the second.
+        # The torque that the first does not need for its own inertia goes to the second.
         self.torque_n_m = (first - self._share * impulse) / time_s
 
     def _elastic_slice(self, until_ns: int) -> None:
-        """Let the torque of the middle of the slice act on both (leapfrog)."""
+        """Advance both with the torque of the middle of the slice (leapfrog)."""
         one, two, stiffness, ratio = self._one, self._two, self._stiffness or 0.0, self._ratio
         half_s = (until_ns - self.first.now_ns) * 0.5e-9
         slip = one.speed_rad_s - ratio * two.speed_rad_s
@@ -119,18 +119,18 @@ class Coupling(Stateful):
 
 
 def swing_rad_s(one: Motor, two: Motor, stiffness_n_m_rad: float, ratio: float) -> float:
-    """Return how fast two motors swing on a spring, rad/s; 0 where both are held."""
+    """Return the angular frequency of two motors on a spring, rad/s; 0 where both are held."""
     return sqrt(stiffness_n_m_rad * _compliance(one, two, ratio))
 
 
 def _compliance(one: Motor, two: Motor, ratio: float) -> float:
-    """Return the acceleration of the slip that a torque at the first motor makes, 1/(kg m2)."""
+    """Return the acceleration of the slip per torque at the first motor, 1/(kg m2)."""
     first = 0.0 if one.held else 1.0 / one.inertia_kg_m2
     return first if two.held else first + ratio**2 / two.inertia_kg_m2
 
 
 def _gain(circuit: Circuit, motor: Motor, until_ns: int, time_s: float) -> float:
-    """Let a circuit pass time; return the angular momentum that its motor gained by itself, N m s."""
+    """Advance a circuit; return the angular momentum that its motor gained without the coupling, N m s."""
     before, helped = motor.speed_rad_s, motor.coupling_n_m
     circuit.advance(until_ns)
     return motor.inertia_kg_m2 * (motor.speed_rad_s - before) - helped * time_s
@@ -151,7 +151,7 @@ stiff shaft to every controller of a drive)."""
 
 @dataclass(frozen=True)
 class CouplingData:
-    """How two plants are coupled.
+    """The coupling of two plants.
 
     Attributes:
         ratio: speed of the first plant's motor over that of the second's.
@@ -166,18 +166,18 @@ class CouplingData:
 
 
 class CoupledPlants:
-    """Two plants that pass time together.
+    """Two plants that advance together.
 
     Attributes:
-        coupling: what is between them.
+        coupling: the coupling between them.
     """
 
     def __init__(self, first: DrivePlant, second: DrivePlant, data: CouplingData) -> None:
         """Couple two plants at their start.
 
         Raises:
-            ParameterError: a value is outside its range, the coupling would swing faster than is followed, or a held
-                shaft would be coupled stiffly.
+            ParameterError: a value is outside its range, the coupling would swing faster than the model follows, or a
+                held shaft would be coupled stiffly.
         """
         self._first, self._second = first, second
         self.coupling = Coupling(
@@ -191,7 +191,7 @@ class CoupledPlants:
         second.go_together(self.advance)
 
     def advance(self, until_ns: int) -> None:
-        """Let the time of both pass to an instant, ns."""
+        """Advance both to an instant, ns."""
         first, second, coupling = self._first, self._second, self.coupling
         while True:
             due_ns = min(first.contacts_ns, second.contacts_ns, until_ns)
@@ -203,11 +203,11 @@ class CoupledPlants:
                 plant.switch_contacts()
 
     def state(self) -> SavedState:
-        """Return what the shaft between them has in it; the plants have states of their own."""
+        """Return the state of the shaft between them; the plants have their own."""
         return self.coupling.state()
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over.
+        """Restore a state.
 
         Raises:
             ParameterError: it is not the state of a coupling.
@@ -216,7 +216,7 @@ class CoupledPlants:
 
 
 def _damping(first: DrivePlant, second: DrivePlant, data: CouplingData) -> float:
-    """Return the damping, N m s/rad, of a coupling whose swing the model follows."""
+    """Return the damping of a coupling, N m s/rad; raise a ParameterError if it is faster than the model follows."""
     if data.stiffness_nm_per_rad is None:
         return 0.0
     require("ratio of the coupling", data.ratio, LEAST_RATIO, MOST_RATIO)

@@ -1,14 +1,11 @@
-"""What can be done to a plant: break something, mend it, load it. One table; stimuli, commands and services use it.
+"""The verbs on a plant: break something, repair it, load it. Stimuli, commands and services use this one table.
 
-A verb takes a text (``3``, ``A``, ``70 0.2``), which is numbers of its own once it was read. It acts at the plant's
-present.
+A verb reads its numbers from a text (``3``, ``A``, ``70 0.2``) and acts at the plant's present. The plant notes what is
+broken.
 
-What a verb on a plant is, how its numbers are read, and how a plant notes what is broken.
-
-What can be done to the line of a plant: sags, other frequencies, a generator's load, disturbances (52.4, 52.5).
-
-Voltage, frequency and a generator's transient are those of the line: bridge and sync transformer see them alike. What
-they see of notches, noise and harmonics ``sync_signal`` says.
+The verbs on the line are sags, other frequencies, a generator's load, and disturbances (52.4, 52.5). Voltage, frequency
+and a generator's transient change the line itself, for bridge and sync transformer alike; ``sync_signal`` describes the
+effect of notches, noise and harmonics on both.
 """
 
 from __future__ import annotations
@@ -30,15 +27,15 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class PlantVerb:
-    """What a verb takes and does.
+    """The values and the action of a verb.
 
     Attributes:
-        wants: what it takes, for messages.
-        read: makes numbers of a text; ValueError where it is none of the verb's.
-        act: does it.
+        wants: a description of its values, for messages.
+        read: converts a text to numbers; ValueError where the text is not valid for the verb.
+        act: executes the verb.
         keys: names of the numbers, for a form with keys.
         needed: how many of them must be given, from the first on.
-        usual: what the others are where they are not given; those at the end without one stay away.
+        usual: defaults of the others; those at the end without a default may be left out.
     """
 
     wants: str
@@ -64,12 +61,12 @@ def one_of(words: Mapping[str, int]) -> Callable[[str], Numbers]:
 def in_ranges(
     *ranges: Range, needed: int = 1, usual: Numbers = (), whole: tuple[int, ...] = ()
 ) -> Callable[[str], Numbers]:
-    """Return a reader of numbers with a blank between, each in its range.
+    """Return a reader of numbers separated by blanks, each in its range.
 
     Args:
-        ranges: the least and the greatest of each.
+        ranges: the least and the greatest value of each.
         needed: how many must be given.
-        usual: what those after them are where they are missing.
+        usual: defaults of those after them.
         whole: places of numbers that must be whole.
     """
 
@@ -88,13 +85,13 @@ def in_ranges(
 
 
 def note(plant: DrivePlant, text: str) -> None:
-    """Note what is broken."""
+    """Add a fault to the plant's notes."""
     if text not in plant.notes:
         plant.notes.append(text)
 
 
 def forget(plant: DrivePlant, verb: str) -> None:
-    """Forget what a verb has broken."""
+    """Remove the faults of a verb from the plant's notes."""
     plant.notes = [text for text in plant.notes if text.split(maxsplit=1)[0] != verb]
 
 
@@ -106,7 +103,7 @@ SAG, HERTZ, LOAD, NOTCHES, NOISE, HARMONIC = (
 
 
 def is_over(plant: DrivePlant, text: str) -> bool:
-    """Return whether what a note tells of has ended by itself."""
+    """Return whether the fault of a note has ended without repair."""
     verb = text.split(maxsplit=1)[0]
     if verb == LOAD:
         return not plant.line.is_moving
@@ -114,7 +111,7 @@ def is_over(plant: DrivePlant, text: str) -> bool:
 
 
 def mend_line(plant: DrivePlant) -> None:
-    """Give a line its usual voltage and frequency, without disturbances; the notes are the caller's."""
+    """Restore a line's usual voltage and frequency, without disturbances; the caller updates the notes."""
     usual = plant.data.parameters
     plant.sync.clear()
     plant.usual_hz = usual.line_hz
@@ -125,7 +122,7 @@ def mend_line(plant: DrivePlant) -> None:
 
 
 def _supply(plant: DrivePlant) -> None:
-    """Give a line the voltage that sag and notches leave, now and after the sag's end."""
+    """Set a line's voltage to the rest that sag and notches leave, now and after the sag's end."""
     line = plant.line
     full = plant.data.parameters.line_v * (1.0 - plant.sync.lost_part)
     line.cancel("voltage")
@@ -203,7 +200,7 @@ def _line_harmonic(plant: DrivePlant, values: Numbers) -> None:
 
 
 def _disturbed(plant: DrivePlant, verb: str, values: Numbers) -> None:
-    """Note a disturbance, in the place of one before; one of 0 is none."""
+    """Note a disturbance in place of the previous one; one of 0 is removed."""
     forget(plant, verb)
     if values[0]:
         note(plant, " ".join([verb, *(f"{value:g}" for value in values)]))
@@ -259,7 +256,7 @@ LINE_VERBS: Mapping[str, PlantVerb] = {
         (0.0,),
     ),
 }
-"""What can be done to a plant's line, by its name."""
+"""The verbs on a plant's line, by name."""
 
 
 _TERMINALS = {"T1": 0, "1": 0, "C": 0, "T2": 1, "2": 1, "B": 1, "T3": 2, "3": 2, "A": 2}
@@ -270,10 +267,10 @@ _ALL = {"ALL": 1}
 
 
 def values_of(verb: str, text: str) -> Numbers:
-    """Return what a verb makes of a text.
+    """Return the numbers that a verb reads from a text.
 
     Raises:
-        ParameterError: there is no such verb, or it does not take that.
+        ParameterError: there is no such verb, or the text is not valid for it.
     """
     if verb not in VERBS:
         raise ParameterError(f"a plant has no {quoted(verb)}: {near_or_listed(verb, VERBS)}")
@@ -284,16 +281,16 @@ def values_of(verb: str, text: str) -> Numbers:
 
 
 def work_on(plant: DrivePlant, verb: str, values: Numbers) -> None:
-    """Let a verb act at the plant's present.
+    """Execute a verb at the plant's present.
 
     Raises:
-        ParameterError: the plant, as it stands, cannot take these values; nothing has happened then.
+        ParameterError: the plant cannot accept these values in its present state; nothing has changed then.
     """
     VERBS[verb].act(plant, values)
 
 
 def active_faults(plant: DrivePlant) -> tuple[str, ...]:
-    """Return what is broken at a plant's present, as verbs with values, in the order in which it broke."""
+    """Return a plant's present faults, as verbs with values, in the order in which they occurred."""
     return tuple(text for text in plant.notes if not is_over(plant, text))
 
 
@@ -308,7 +305,7 @@ def _open_gate(plant: DrivePlant, values: Numbers) -> None:
 
 
 def _blow_fuse(plant: DrivePlant, values: Numbers) -> None:
-    """Open a phase between line and bridge: the 57C406 sees the line through fuses of its own and stays locked."""
+    """Open a phase between line and bridge: the 57C406 has its own fuses to the line and stays locked."""
     plant.circuit.open_phase(int(values[0]))
     note(plant, f"blow_fuse T{int(values[0]) + 1}")
 
@@ -338,7 +335,7 @@ def _load(plant: DrivePlant, values: Numbers) -> None:
 
 
 def _repair(plant: DrivePlant, _: Numbers) -> None:
-    """Put all that is broken right; the load stays, the contactor too."""
+    """Repair all faults; the load and the contactor stay as they are."""
     circuit, line = plant.circuit, plant.line
     for scr, bit in BIT.items():
         if circuit.bridge.wiring.shorted >> bit // 2 & 1:
@@ -370,4 +367,4 @@ VERBS: Mapping[str, PlantVerb] = {
     "load_torque_nm": PlantVerb("N m, -1e6 to 1e6", in_ranges(_TORQUE), _load),
     "repair": PlantVerb("all", one_of(_ALL), _repair),
 }  # fmt: skip
-"""Everything that can be done to a plant, by its name."""
+"""All verbs on a plant, by name."""

@@ -1,10 +1,10 @@
 """The hardware's overspeed circuit, which DIGITAL_TACH sets up: it trips a drive without its loop (52.1.5).
 
-It counts the pulses of a digital tachometer, so it sees a speed that has been above the threshold for ``COUNTED_NS``.
-The threshold is OSV_THRESH, in counts of which 4095 are full speed, that of task initialisation; it stays until the
-next one or a loss of power, also while no task runs. A trip takes gates and contactor away, and is kept until the loop
-has heard of it and its faults are reset, which they cannot be while the speed is above the threshold (decision: of the
-circuit nothing is published but that it is there).
+It counts the pulses of a digital tachometer, so it detects a speed that has been above the threshold for
+``COUNTED_NS``. The threshold is OSV_THRESH at task initialisation, in counts of which 4095 are full speed; it stays
+until the next initialisation or a loss of power, also while no task runs. A trip turns gates and contactor off, and is
+kept until it was reported to the loop and the loop's faults are reset, which they cannot be while the speed is above
+the threshold (decision: of the circuit nothing is published but that it is there).
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from automax_ros.drive.plant.plant import RAD_S_PER_RPM, DrivePlant
 from automax_ros.drive.plant.signals import tach_rpm
 
 COUNTED_NS: Final = 20_000_000
-"""How long the circuit counts pulses, ns (decision: longer than a feed and a scan take, so an OSV_FDBK that is sound
-trips first)."""
+"""Time for which the circuit counts pulses, ns (decision: longer than a feed and a scan take, so an OSV_FDBK that is
+sound trips first)."""
 FULL: Final = 4095
 """Counts of full speed (52.1.5, SPEED_FDBK)."""
 NEVER: Final = -1
 SOUND, TRIPPED, TOLD = 0, 1, 2
-"""It has not tripped; it has; it has, and the loop has heard of it."""
+"""The circuit has not tripped; it has tripped; it has tripped and reported this to the loop."""
 
 
 class OverspeedCircuit:
@@ -33,7 +33,7 @@ class OverspeedCircuit:
     """
 
     def __init__(self, plant: DrivePlant | None, full_rpm: float | None = None) -> None:
-        """Begin without a threshold; ``full_rpm``: the speed of 4095 counts, None for the motor's base speed."""
+        """Create it without a threshold; ``full_rpm``: the speed of 4095 counts, None for the motor's base speed."""
         self._plant = plant
         self._full_rpm = full_rpm or 0.0
         if plant is not None and not full_rpm:
@@ -49,7 +49,7 @@ class OverspeedCircuit:
 
     @property
     def sees(self) -> bool:
-        """Whether it sees the speed above the threshold."""
+        """Whether it measures a speed above the threshold."""
         plant = self._plant
         return plant is not None and 0 <= self._above_ns <= plant.now_ns - COUNTED_NS
 
@@ -60,11 +60,11 @@ class OverspeedCircuit:
 
     @property
     def is_news(self) -> bool:
-        """Whether it has tripped and the loop has not heard of it."""
+        """Whether it has tripped and not reported this to the loop."""
         return self._trip == TRIPPED
 
     def look(self) -> bool:
-        """Look at the plant's present; return whether it trips now."""
+        """Check the plant's present speed; return whether the circuit trips now."""
         plant = self._plant
         if plant is None or not self.counts:
             return False
@@ -79,7 +79,7 @@ class OverspeedCircuit:
         return True
 
     def told(self) -> None:
-        """The loop hears of it."""
+        """Record that the trip was reported to the loop."""
         if self._trip == TRIPPED:
             self._trip = TOLD
 
@@ -90,13 +90,13 @@ class OverspeedCircuit:
         return self._trip != SOUND
 
     def unpower(self) -> None:
-        """Forget threshold and trip: the module has no power."""
+        """Clear threshold and trip: the module has no power."""
         self.load((0, NEVER, SOUND))
 
     def state(self) -> list[int]:
-        """Return what the future depends on."""
+        """Return the state."""
         return [self.counts, self._above_ns, self._trip]
 
     def load(self, state: Sequence[int]) -> None:
-        """Take over what ``state`` gave."""
+        """Restore what ``state`` returned."""
         self.counts, self._above_ns, self._trip = state

@@ -1,8 +1,7 @@
-"""The plant of one drive: its line, bridge, contactor, motor and load, as one thing that passes time (drive.md part C).
+"""The plant of one drive: its line, bridge, contactor, motor and load, advanced together (docs/plants.md).
 
-A controller commands gates and the contactor; everybody else looks, loads the shaft, or breaks something.
-
-What an observer measures of a plant: means over a time of its own, and energies. Measuring changes nothing.
+A controller commands gates and the contactor; all others read values, load the shaft, or cause faults. An observer
+measures means over its own times, and energies; measuring changes nothing.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ from automax_ros.drive.plant.sync_signal import SyncSignal
 
 @dataclass(frozen=True)
 class Means:
-    """Means of a time that has passed.
+    """Means over a past time.
 
     Attributes:
-        duration_s: how long it was, s; all is 0 where it is 0.
+        duration_s: its length, s; all values are 0 where it is 0.
         current_a: mean armature current, A; positive from bridge 1.
         current_rms_a: rms of the armature current, A.
         voltage_v: mean voltage over the armature's terminals, V; the EMF counts while no current flows.
@@ -42,10 +41,10 @@ class Means:
 
 
 class PlantMeter:
-    """Means over the times between one look and the next, whoever takes samples of the circuit meanwhile; energies."""
+    """Means from one reading to the next, whatever samples of the circuit are fetched meanwhile; energies."""
 
     def __init__(self, circuit: Circuit) -> None:
-        """Begin at the circuit's present, with metering its energies too, unless it does already."""
+        """Create the meter at the circuit's present; meter its energies too, unless they are already."""
         self._circuit = circuit
         if circuit.energy is None:
             circuit.energy = EnergyMeter()
@@ -53,13 +52,13 @@ class PlantMeter:
         self._told = _sums(circuit.present_sample())
 
     def add(self, sample: Sample) -> None:
-        """Count a sample that somebody has taken."""
+        """Add a sample that was fetched from the circuit."""
         one, two, three, four = _sums(sample)
         sums = self._sums
         self._sums = sums[0] + one, sums[1] + two, sums[2] + three, sums[3] + four
 
     def look(self) -> Means:
-        """Return the means since the look before."""
+        """Return the means since the last reading."""
         present = _sums(self._circuit.present_sample())
         duration, charge, square, volt_s = (
             sums + now - told for sums, now, told in zip(self._sums, present, self._told, strict=True)
@@ -93,10 +92,10 @@ RAD_S_PER_RPM: Final = pi / 30
 
 @dataclass(frozen=True)
 class LoadData:
-    """What the motor turns.
+    """The load of a motor.
 
     Attributes:
-        torque_nm: a torque that keeps its direction at any speed, N m; positive brakes positive speed. What is set from
+        torque_nm: a torque that keeps its direction at any speed, N m; positive brakes positive speed. A value set from
             outside replaces it.
         torque_per_rpm: pairs of rpm and N m, rpm ascending: straight lines between them, level beyond them. A table
             that begins at 0 or above counts for both directions: it brakes (decision).
@@ -124,7 +123,7 @@ class LoadData:
 
 @dataclass(frozen=True)
 class PlantData:
-    """What a plant is made of; SI units.
+    """The data of a plant; SI units.
 
     Attributes:
         parameters: the motor, and its line's voltage, frequency and inductance.
@@ -132,7 +131,7 @@ class PlantData:
         inertia: inertia of motor and load over the motor's own.
         standard_rotation: whether the line's phases pass in the order C, B, A. Such a line is connected so that the
             drive's terminals T1, T2, T3 carry C, B, A; one of the other rotation is connected alike (decision).
-        load: what the motor turns.
+        load: the motor's load.
     """
 
     parameters: DriveParameters
@@ -149,18 +148,18 @@ class DrivePlant(Stateful):
         circuit: line, bridge and motor.
         rated_amps: rated armature current, A.
         rated_v: nominal line-to-line voltage, V rms.
-        meter: what an observer measures by, None while nobody does.
-        notes: what is broken, as the verbs of ``plant_faults`` that broke it.
+        meter: the observer's meter, None while there is none.
+        notes: the faults, as the verbs of ``plant/faults`` that caused them.
         sag: percentage of the line's voltage that a sag leaves.
-        sag_end_ns: until when the line's voltage sags (ns), 0 where no end is known.
-        usual_hz: the line's frequency but for a generator's transient, Hz.
-        sync: the line as the sync transformer sees it.
+        sag_end_ns: end of the sag of the line's voltage (ns), 0 where no end is known.
+        usual_hz: the line's frequency apart from a generator's transient, Hz.
+        sync: the sync signal of the line.
     """
 
     _kept = ("_contacts", "_relay", "_load_nm", "notes", "sag", "sag_end_ns", "usual_hz")
 
     def __init__(self, data: PlantData, *, energy: bool = False) -> None:
-        """Begin at rest, without current, the contactor open."""
+        """Create the plant at rest, without current, the contactor open."""
         parameters = data.parameters
         self.data = data
         self.rated_amps = parameters.amps
@@ -204,7 +203,7 @@ class DrivePlant(Stateful):
 
     @property
     def load_torque_nm(self) -> float:
-        """The load torque that keeps its direction, N m: what the configuration says, until somebody sets another."""
+        """The load torque that keeps its direction, N m: the configured one until another is set."""
         return self._load_nm
 
     @load_torque_nm.setter
@@ -219,7 +218,7 @@ class DrivePlant(Stateful):
         return self.circuit.now_ns
 
     def advance(self, until_ns: int) -> None:
-        """Let time pass to an instant, ns, for coupled plants too; an instant that has passed is the present."""
+        """Advance to an instant, ns, coupled plants too; an instant in the past counts as the present."""
         if self._together is not None:
             self._together(until_ns)
             return
@@ -231,12 +230,12 @@ class DrivePlant(Stateful):
             circuit.advance(until_ns)
 
     def go_together(self, advance: Callable[[int], None]) -> None:
-        """Let somebody pass this plant's time with another's: ``plant_coupling``."""
+        """Set the function that advances this plant together with another; see ``plant/coupling``."""
         self._together = advance
 
     @property
     def contacts_ns(self) -> float:
-        """When the contactor's contacts move next, ns; infinite while they rest."""
+        """Instant at which the contactor's contacts move next, ns; infinite while they rest."""
         return self._contacts[0][0] if self._contacts else inf
 
     def switch_contacts(self) -> None:
@@ -262,12 +261,12 @@ class DrivePlant(Stateful):
 
     @property
     def is_closed(self) -> bool:
-        """Whether the contactor's contacts touch; an arc is none."""
+        """Whether the contactor's contacts touch; an arc does not count."""
         wiring = self.bridge.wiring
         return wiring.armature_closed and not wiring.armature_arc_v
 
     def begin_metering(self) -> None:
-        """Let an observer have means and energies from now on; what the plant does stays the same, bit for bit."""
+        """Meter means and energies from now on; the plant's behavior stays the same, bit for bit."""
         self.meter = PlantMeter(self.circuit)
 
     def state(self) -> SavedState:
@@ -275,14 +274,14 @@ class DrivePlant(Stateful):
         return super().state() | {"circuit": self.circuit.state(), "sync": self.sync.state()}
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over.
+        """Restore a state.
 
         Raises:
             ParameterError: it is not the state of such a plant.
         """
         check_names("plant", state, (*self._kept, "circuit", "sync"))
         super().restore({name: state[name] for name in self._kept})
-        # Whether energies are metered is the observer's choice, and nothing else depends on it.
+        # Whether energies are metered is up to the observer, and nothing else depends on it.
         self.circuit.energy = None if state["circuit"].get("energy") is None else EnergyMeter()
         self.circuit.restore(state["circuit"])
         self.sync.restore(state["sync"])

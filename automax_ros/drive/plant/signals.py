@@ -1,4 +1,4 @@
-"""What can be seen of a plant at an instant: single signals, as instruments show them, and all at once."""
+"""The signals of a plant at an instant: single ones, as instruments show them, and all at once."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from automax_ros.drive.plant.plant import FIELD_AMPS, RAD_S_PER_RPM, DrivePlant
 
 
 def tach_rpm(plant: DrivePlant) -> float:
-    """Return what the tachometer shows, rpm: 0 once it is lost."""
+    """Return the tachometer's reading, rpm: 0 once it is lost."""
     return 0.0 if "lose_tach" in plant.notes else _rpm(plant)
 
 
@@ -50,7 +50,7 @@ class Energies:
 
 @dataclass(frozen=True)
 class PlantSignals:
-    """How a plant stands at an instant; SI units, speed in rpm.
+    """The state of a plant at an instant; SI units, speed in rpm.
 
     Attributes:
         time_ns: the instant.
@@ -63,7 +63,7 @@ class PlantSignals:
         bridge: 1 (forward) or 2 (reverse), the bridge that conducts; 0 while none does.
         contactor: whether the contacts are closed.
         line_hz, line_v: frequency of the line, and its voltage from line to line, rms.
-        faults: what is broken, as ``plant_faults`` calls it, in the order in which it broke.
+        faults: the faults by their names of ``plant/faults``, in the order in which they occurred.
         energies: None where they are not metered.
     """
 
@@ -84,7 +84,7 @@ class PlantSignals:
 
 
 def signals_of(plant: DrivePlant) -> PlantSignals:
-    """Return how a plant stands at its present."""
+    """Return the signals of a plant at its present."""
     circuit, motor, line = plant.circuit, plant.motor, plant.line
     conducting = circuit.conducting
     return PlantSignals(

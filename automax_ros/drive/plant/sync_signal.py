@@ -1,16 +1,16 @@
-"""The sync signal of a drive: the line as the sync transformer of its 57C406 sees it, with what disturbs it (52.5).
+"""The sync signal of a drive: the line at the sync transformer of its 57C406, with disturbances (52.5).
 
-A comparator makes of the signal the instants at which phase T1 is at its maximum: where the voltage of the two other
+A comparator detects in the signal the instants at which phase T1 is at its maximum: where the voltage of the two other
 phases rises through zero. Per unit of its peak, theta counted from that instant, the signal is::
 
     sin theta + sum p_k sin(k theta + phi_k) - d sign(sin theta) in each notch
 
-The first rise through zero counts; after it the comparator is deaf for three quarters of a cycle. Noise moves each
+The first rise through zero counts; after it the comparator is blocked for three quarters of a cycle. Noise moves each
 instant by its ratio to the slope (decision: of the transformer and its comparator nothing is published).
 
-What the bridge sees of it: a notch takes as much of its voltage as it takes of the area, so the bridge gives less than
-the firing angle promises (52.4); its wave stays a sinusoid, or the circuit had no closed solution. Harmonics and noise
-it does not see: their mean over an SCR's conduction is small (decision).
+Effect on the bridge: a notch reduces its voltage in proportion to the area of the notch, so the bridge gives less than
+the firing angle promises (52.4); its wave stays a sinusoid, or the circuit would have no closed solution. Harmonics and
+noise have no effect on it: their mean over an SCR's conduction is small (decision).
 """
 
 from __future__ import annotations
@@ -42,38 +42,38 @@ class SyncSignal(Stateful):
     _kept = ("notches", "noise", "harmonics", "_cycle", "_turn")
 
     def __init__(self) -> None:
-        """Begin without disturbances."""
+        """Create the signal without disturbances."""
         self.notches: tuple[float, float, int, float] = (0.0, 0.0, 0, 0.0)
         self.noise: tuple[float, int] = (0.0, 0)
         self.harmonics: list[tuple[int, float, float]] = []
         self._cycle = 0
         self._turn = 0.0
         self._rise = 0.0
-        """Where the signal rises through zero without noise, rad; infinite where it never does."""
+        """Angle at which the signal rises through zero without noise, rad; infinite where it never does."""
 
     def clear(self) -> None:
-        """Take all disturbances away."""
+        """Remove all disturbances."""
         self.__init__()  # type: ignore[misc]
 
     def set_notches(self, depth: float, width: float, count: int, first: float) -> None:
-        """Let there be notches, as ``notches`` has them."""
+        """Set the notches, with the values of ``notches``."""
         self.notches = (depth, width, count, first)
         self._look_for_rise()
 
     def set_noise(self, part: float, seed: int) -> None:
-        """Let there be noise, as ``noise`` has it; its numbers begin again."""
+        """Set the noise, with the values of ``noise``; its sequence of numbers restarts."""
         self.noise = (part, seed)
         self._cycle = 0
 
     def set_harmonic(self, order: int, part: float, phase: float) -> None:
-        """Let there be a harmonic in the place of one of the same order, or none with a ``part`` of 0."""
+        """Set a harmonic in place of one of the same order; a ``part`` of 0 removes it."""
         others = [item for item in self.harmonics if item[0] != order]
         self.harmonics = sorted([*others, (order, part, phase)] if part else others)
         self._look_for_rise()
 
     @property
     def lost_part(self) -> float:
-        """The part of the bridge's voltage that the notches take."""
+        """The part of the bridge's voltage that is lost by the notches."""
         depth, width, count, _ = self.notches
         return min(depth, 1.0) * min(width * count, 1.0)
 
@@ -101,7 +101,7 @@ class SyncSignal(Stateful):
         return passed if 0.0 <= passed < TURN else passed % TURN
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over.
+        """Restore a state.
 
         Raises:
             ParameterError: it is not the state of a sync signal.
@@ -110,7 +110,7 @@ class SyncSignal(Stateful):
         self._look_for_rise()
 
     def _instant(self, cycle: int) -> float:
-        """Return where the comparator's instant of a cycle lies, rad after T1's maximum."""
+        """Return the comparator's instant in a cycle, rad after T1's maximum."""
         part, seed = self.noise
         moved = self._rise + part * random_number(seed, cycle) if part else self._rise
         return max(-_QUARTER, min(_QUARTER, moved))
@@ -125,7 +125,7 @@ def random_number(seed: int, place: int) -> float:
     bits = ((bits ^ bits >> 30) * 0xBF58476D1CE4E5B9) & _MASK
     bits = ((bits ^ bits >> 27) * 0x94D049BB133111EB) & _MASK
     bits ^= bits >> 31
-    # Four equally distributed numbers of 16 bits: a variance of 1/12 each.
+    # Four uniformly distributed numbers of 16 bits: a variance of 1/12 each.
     whole = (bits & 0xFFFF) + (bits >> 16 & 0xFFFF) + (bits >> 32 & 0xFFFF) + (bits >> 48)
     return (whole / 65536.0 - 2.0) * sqrt(3.0)
 
@@ -155,7 +155,7 @@ def first_rise(notches: tuple[float, float, int, float], harmonics: Sequence[tup
 
 
 def _windows(width: float, count: int, first: float) -> list[tuple[float, float]]:
-    """Return where notches of a width (rad) begin and end, from -pi to pi, with those that reach into it."""
+    """Return the begin and end of notches of a width (rad) from -pi to pi, with those that reach into this range."""
     begins = [(first + TURN * number / count + pi) % TURN - pi for number in range(count)]
     return [(begin + turn, begin + turn + width) for begin in begins for turn in (-TURN, 0.0, TURN)]
 
@@ -168,7 +168,7 @@ def _wave(theta: float, harmonics: Sequence[tuple[int, float, float]]) -> float:
 
 
 def _zero(low: float, high: float, shift: float, harmonics: Sequence[tuple[int, float, float]]) -> float:
-    """Return where the wave reaches a level between two angles; the first of them where it has at once."""
+    """Return the angle at which the wave reaches a level between two angles; the first where it already has there."""
     if _wave(low, harmonics) - shift >= 0.0:
         return low
     for _ in range(60):

@@ -1,10 +1,10 @@
 """The PMI of an SD3000 drive: it regulates the current of a plant as a UDC commands (S-3006, S-3056 p. 4-8, 4-10).
 
-It runs the current minor loop of section 52 on a raster of its own, six times per line cycle, not synchronized with the
-scans of the UDC (decision: it is so with AC drives). Its gains are those of ``cml/proposals`` for its motor (decision).
-LIM_BAR is the Motor Overload Ratio, and it trips at that ratio + 75 points of the rated current (S-3006, page 109).
-Each start tests the SCRs (decision). It has power of its own and follows its line whatever becomes of the rack
-(decision); a drive that the UDC does not command any more stops. Faults stand in its register and are not logged
+It runs the current minor loop of section 52 on its own raster, six times per line cycle, not synchronized with the
+scans of the UDC (decision: it is so with AC drives). Its gains are those of ``current_loop/proposals`` for its motor
+(decision). LIM_BAR is the Motor Overload Ratio, and it trips at that ratio + 75 points of the rated current (S-3006,
+page 109). Each start tests the SCRs (decision). It has its own power supply and follows its line whatever happens to
+the rack (decision); a drive that the UDC no longer commands stops. Faults are set in its register and not logged
 (decision).
 """
 
@@ -46,7 +46,7 @@ HIGHEST_TRIP = 400
 DROPOUT_S = 0.1
 """Longest time from a stop to the opening of the contactor, s (decision: the default of MAX_M_DROPOUT)."""
 VOLTAGE_LAG_NS = 20_000_000
-"""Time constant of the armature voltage that the PMI tells, ns (decision: TACHLOSS_OVERSPEED has no filter, and at
+"""Time constant of the armature voltage that the PMI reports, ns (decision: TACHLOSS_OVERSPEED has no filter, and at
 standstill a change of the current needs more voltage than its limit of tach loss for some scans)."""
 _WORD = 32767
 _BITS = {
@@ -60,13 +60,13 @@ _BITS = {
 
 
 class Commands(NamedTuple):
-    """What the PMI knows at an instant: command registers, its inputs, and how its UDC stands.
+    """The PMI's inputs at an instant: command registers, input register, and the state of its UDC.
 
     Attributes:
         control, reference, alpha: the registers 100 to 102; a UDC that is not linked commands nothing.
         inputs: register 201.
         linked: whether there is a common clock.
-        fed: whether a UDC task scans that commands the drive.
+        fed: whether a UDC task that commands the drive is scanning.
     """
 
     control: int = 0
@@ -82,18 +82,18 @@ class Pmi(Stateful):
 
     Attributes:
         loop: its current minor loop.
-        link_faults: bits of the fault register for what has happened to the UDC.
+        link_faults: bits of the fault register for faults of the UDC.
         warnings: the warning register.
         ready: whether a start would be accepted.
-        current: as ``Measured`` has it, at the last interrupt.
-        voltage: the same, after its lag.
+        current: ``Measured.current`` at the last interrupt.
+        voltage: ``Measured.voltage`` after its lag.
         position: the count of the resolver.
     """
 
     _kept = ("link_faults", "warnings", "ready", "current", "voltage", "position")
 
     def __init__(self, plant: DrivePlant, ratio: int | None = None) -> None:
-        """Begin in standby; ``ratio`` is the Motor Overload Ratio, %."""
+        """Create the PMI in standby; ``ratio`` is the Motor Overload Ratio, %."""
         parameters = plant.data.parameters
         self.plant = plant
         self.ratio = USUAL_RATIO if ratio is None else ratio
@@ -154,7 +154,7 @@ class Pmi(Stateful):
         return scan_ns
 
     def feedback(self, now_ns: int) -> dict[int, int]:
-        """Return the feedback registers at an instant, by their numbers for drive A; the plant comes to it.
+        """Advance the plant to an instant and return the feedback registers by their numbers for drive A.
 
         Speed and position are those of the instant, the current is the mean between the last two interrupts of the
         PMI, the voltage such means after a lag (decision: the ripple is not to be seen). A lost tachometer shows 0,
@@ -183,11 +183,11 @@ class Pmi(Stateful):
         }
 
     def state(self) -> SavedState:
-        """Return all that its future depends on but the plant, which has a state of its own."""
+        """Return the state, without that of the plant."""
         return super().state() | {"loop": self.loop.numbers(), "firing": self._controller.state()}
 
     def restore(self, state: SavedState) -> None:
-        """Take a state over.
+        """Restore a state.
 
         Raises:
             ParameterError: it is not the state of a PMI.
@@ -201,7 +201,7 @@ class Pmi(Stateful):
         self._controller.load(state["firing"])
 
     def _judge_link(self, commands: Commands) -> None:
-        """A drive that is not in standby trips where its UDC does not command it any more."""
+        """Trip a drive that is not in standby when its UDC no longer commands it."""
         if self.loop.sequence.phase is Phase.STANDBY:
             return
         if not commands.linked:
@@ -224,10 +224,10 @@ class Pmi(Stateful):
 
 
 def inputs_of(plant: DrivePlant, ratio: int) -> Inputs:
-    """Return what the loop of a PMI has as inputs at rest: the drive's parameters.
+    """Return the inputs of a PMI's loop at rest: the drive's parameters.
 
     Args:
-        plant: its plant.
+        plant: the PMI's plant.
         ratio: Motor Overload Ratio, %.
     """
     data = plant.data
@@ -264,5 +264,5 @@ def inputs_of(plant: DrivePlant, ratio: int) -> Inputs:
 
 
 def _limited(number: float) -> int:
-    """Return a number as a register holds it."""
+    """Return a number rounded and limited to the range of a register."""
     return round(max(-_WORD, min(_WORD, number)))

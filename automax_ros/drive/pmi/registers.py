@@ -1,7 +1,7 @@
 """The registers of an SD3000 drive in the dual port of its UDC (decision: the manual's chapter on them is not known).
 
 Known are 207 (4095 at the Motor Overload Ratio), bit 9 of 100 (resets the counters of the rail ports), and the count of
-messages in 81; all else is ours. Numbers are those of drive A, drive B has each 1000 above.
+messages in 81; all others are ours. Numbers are those of drive A; those of drive B are 1000 higher.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 DRIVE_B = 1000
-"""What is added to a number for drive B."""
+"""Offset of a number for drive B."""
 
 
 @dataclass(frozen=True)
 class PmiRegister:
-    """A register: its number for drive A, what it holds, and of a word of bits what each bit means."""
+    """A register: its number for drive A, its content, and the meaning of each bit of a word of bits."""
 
     number: int
     meaning: str
@@ -30,7 +30,7 @@ LINE_PERIOD, BAD_SCR_NUM, REF_LAG_OUT = 212, 213, 214
 NO_CLOCK = 1 << 0
 """Bit of ``LINK``: there is no common clock, nothing is exchanged."""
 LAST_MESSAGE = 32_000
-"""Where the count of messages rolls over to 0."""
+"""Value at which the count of messages rolls over to 0."""
 
 (RUN, TEST, COAST, REVERSE_CONTACTOR, TEST_BRIDGE_2, FAST_CHANGE, ANY_ROTATION) = (1 << bit for bit in range(7))
 FAULT_RESET, COUNTER_RESET = 1 << 8, 1 << 9
@@ -72,7 +72,7 @@ COMMAND_REGISTERS = (
     PmiRegister(REFERENCE, "current reference, 4095 at the Motor Overload Ratio"),
     PmiRegister(ALPHA, "firing angle of test mode, 0 to 180 degrees"),
 )
-"""What tasks write."""
+"""The registers that tasks write."""
 
 FEEDBACK_REGISTERS = (
     PmiRegister(
@@ -130,13 +130,13 @@ FEEDBACK_REGISTERS = (
     PmiRegister(BAD_SCR_NUM, "pair of the shorted SCR, 1 to 6; 0 without one"),
     PmiRegister(REF_LAG_OUT, "reference after its lag, as 101; 0 in standby"),
 )
-"""What comes back: the PMI writes all but the inputs."""
+"""The feedback: the PMI writes all of these but the inputs."""
 
 LINK_REGISTERS = (
     PmiRegister(LINK, "communication status", ((0, "no common clock: nothing is exchanged"),)),
     PmiRegister(MESSAGES, "messages received from the PMI, 0 to 32000"),
 )
-"""What the UDC tells of its link."""
+"""The UDC's registers of its link."""
 
 WRITTEN = tuple(item.number for item in (*FEEDBACK_REGISTERS, *LINK_REGISTERS) if item.number != INPUTS)
 """The registers of drive A that the module writes where the drive has a PMI."""

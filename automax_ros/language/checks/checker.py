@@ -1,4 +1,4 @@
-"""The checker: from the text of a task to a checked Program, or to all that is wrong with it in one pass."""
+"""The checker: from the text of a task to a checked Program, or to all its faults in one pass."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ _NOT_READ = (_TOO_LARGE, _TOO_MANY, _UTF_16)
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What a check found. ``program`` is None if there are errors; ``diagnostics`` are in the order of the text.
+    """The result of a check. ``program`` is None if there are errors; ``diagnostics`` are in the order of the text.
 
-    ``unconfirmed`` are the places at which the task uses a form that no source confirms, with what is not confirmed.
+    ``unconfirmed`` are the places at which the task uses a form that no source confirms, with a description of the
+    form.
     """
 
     program: Program | None
@@ -54,11 +55,11 @@ def check(
 ) -> CheckResult:
     """Check a task; never raises, whatever the text. The source's name says whether it is a BASIC task.
 
-    ``name`` is the task's name, ``catalogue`` the blocks by name, ``tick_ns`` the tick in ns. ``commons`` is what the
-    rack defines, by full name: a COMMON that it lacks or defines otherwise is an error, and so is a write to an input
-    point. None takes the task's declarations as the definition.
+    ``name`` is the task's name, ``catalogue`` the blocks by name, ``tick_ns`` the tick in ns. ``commons`` are those of
+    the rack by full name: a COMMON that the rack lacks or defines differently is an error, and so is a write to an
+    input point. With None the task's declarations are the definition.
 
-    At most DIAGNOSTIC_LIMIT problems are reported, by one more that says so.
+    At most DIAGNOSTIC_LIMIT problems are reported, and one more that says so.
     """
     module, found = parse(source)
     if any(item.code in _NOT_READ for item in found):
@@ -116,7 +117,7 @@ def _check_call(context: Context, statement: Call) -> None:
 
 
 def _check_expected_blocks(context: Context, layout: TaskLayout) -> None:
-    """Warn of a task without a block that its Processor expects: on a UDC that which protects the motor (36)."""
+    """Warn of a task without a block that its Processor expects: on a UDC the one that protects the motor (36)."""
     loop = layout.scan_loop
     expected = [block for block in context.catalogue.values() if context.target in block.expected_on]
     if loop is None or not expected:

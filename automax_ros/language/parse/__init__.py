@@ -1,1 +1,1 @@
-"""Logical lines to the syntax tree."""
+"""Parses logical lines to the syntax tree."""

@@ -1,6 +1,6 @@
-"""How the statements of events, times, channels and ports are read after their first word (J-3675 6.6 to 6.8).
+"""Parses the statements of events, times, channels and ports after their first word (J-3675 6.6 to 6.8).
 
-No source shows where the number stands in the EMPTY= and FULL= forms; ours is INPUT:EMPTY=line #n, list (decision).
+No source shows the place of the number in the EMPTY= and FULL= forms; ours is INPUT:EMPTY=line #n, list (decision).
 The number after # is a constant, so that a check knows what each one is (decision).
 """
 
@@ -212,4 +212,4 @@ WAITING_STATEMENTS: dict[str, Callable[[Cursor, Token], Statement]] = {
     "PUT": _put,
     "PRINT": _print,
 }
-"""How each statement that only a BASIC task has is read after its first word; PRINT has more forms there."""
+"""The parser of each statement that only a BASIC task has, called after its first word; PRINT has more forms there."""

@@ -47,7 +47,7 @@ class Cursor:
         return self.tokens[self.position].text in texts
 
     def accept(self, text: str) -> bool:
-        """Read the word or mark if it stands here."""
+        """Read the word or mark if it is the current token."""
         if self.tokens[self.position].text == text:
             self.position += 1
             return True
@@ -62,11 +62,11 @@ class Cursor:
         return self.tokens[self.position].kind is Kind.END
 
     def at_separator(self) -> bool:
-        """Return whether the mark between two statements stands here."""
+        """Return whether the current token separates two statements."""
         return self.tokens[self.position].kind is Kind.SEPARATOR
 
     def fail(self, code: str, message: str, hint: str | None = None, notes: tuple[Note, ...] = ()) -> NoReturn:
-        """Raise a syntax error at the current token; a token that is wrong in itself tells its own fault."""
+        """Raise a syntax error at the current token; a token with a fault raises that fault."""
         token = self.current
         if token.kind is Kind.ERROR and token.fault is not None:
             raise SyntaxFaultError(token.fault, token.span)
@@ -77,7 +77,7 @@ class Cursor:
         return self.current.span
 
     def found(self) -> str:
-        """What stands at the current place, for a message."""
+        """The current token, for a message."""
         token = self.current
         if token.kind is Kind.END:
             return "the end of the line"
@@ -122,10 +122,10 @@ class Cursor:
         return name
 
     def skip_statement(self) -> None:
-        """Step to the end of a statement that could not be read."""
+        """Move to the end of a statement that could not be read."""
         while self.current.kind is not Kind.END and self.current.kind is not Kind.SEPARATOR:
             self.position += 1
 
     def skip_line(self) -> None:
-        """Step to the end of the logical line."""
+        """Move to the end of the logical line."""
         self.position = len(self.tokens) - 1

@@ -1,4 +1,4 @@
-"""LOCAL, COMMON and GLOBAL, with arrays, string lengths and tunables; EVENT.
+"""Parses LOCAL, COMMON and GLOBAL, with arrays, string lengths and tunables, and EVENT.
 
 Form of a tunable (decision): LOCAL GAIN [CURRENT=1.5, HIGH=10.0, LOW=0.0, STEP=0.1], keys in any order.
 """

@@ -1,4 +1,4 @@
-"""Expressions: precedence, subscripts and function calls.
+"""Parses expressions: precedence, subscripts and function calls.
 
 Precedence, high to low: parentheses; unary - +; ** ; * / ; + - ; relational; NOT; AND; OR XOR. Equal levels go from
 left to right (J-3675, 5). Relational operators bind closer than NOT, NOT than AND, AND than OR and XOR (decision).
@@ -42,7 +42,7 @@ LEVELS: dict[str, int] = {
     "/": 6,
     "**": 7,
 }
-"""Binary operators by precedence; NOT stands between AND and the relational ones, a sign above all."""
+"""Binary operators by precedence; NOT is between AND and the relational ones, a sign above all."""
 _CLOSING = {"(": ")", "[": "]"}
 _Measured = tuple[Expression, int]
 
@@ -217,7 +217,7 @@ def _close(cursor: Cursor, opening: Token) -> None:
 
 
 def close_parenthesis(cursor: Cursor, opened: Span, opening: str = "(") -> None:
-    """Report a parenthesis that is not closed where it should be: something foreign in it, or its end is missing."""
+    """Raise the error for a parenthesis that is not closed here: another token follows, or its end is missing."""
     closing = _CLOSING[opening]
     token = cursor.current
     begins_value = token.is_name or token.kind in (Kind.INTEGER, Kind.REAL, Kind.STRING)

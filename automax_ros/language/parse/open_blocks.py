@@ -1,4 +1,4 @@
-"""Open IF and FOR blocks: where a statement belongs, and what is wrong when the ends do not match."""
+"""Open IF and FOR blocks: they receive the statements, and report ends that do not match."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ NESTING_LIMIT = 16
 
 @dataclass
 class Frame:
-    """A block whose end was not read yet.
+    """A block whose end has not been read yet.
 
     ``node`` is its IF or FOR without a body, None where the head was wrong: then ``body`` is the list of the block
-    around it. ``doubtful`` blocks may have no end of their own: a wrong head does not tell.
+    around it. A ``doubtful`` block may not have an end: its wrong head does not show whether it begins a block.
     """
 
     word: str
@@ -33,11 +33,11 @@ class Frame:
 
     @property
     def statements(self) -> list[Statement]:
-        """Where the next statement goes."""
+        """The list for the next statement."""
         return self.body if self.otherwise is None else self.otherwise
 
     def closed(self) -> list[Statement]:
-        """Return the statement that the block is, none where its head was wrong."""
+        """Return the statement made of the block, none where its head was wrong."""
         if isinstance(self.node, If):
             return [dataclasses.replace(self.node, then=tuple(self.body), otherwise=tuple(self.otherwise or ()))]
         if isinstance(self.node, For):
@@ -46,7 +46,7 @@ class Frame:
 
 
 class FrameStack:
-    """The open blocks of a task, innermost last, and the line number that waits for its statement."""
+    """The open blocks of a task, innermost last, and the pending line number of the next statement."""
 
     def __init__(self, reporter: Reporter) -> None:
         self._reporter = reporter
@@ -69,12 +69,12 @@ class FrameStack:
         self._number = number
 
     def end_line(self, span: Span) -> None:
-        """Leave a label where no statement of the line could be read, so that jumps to it are not wrong too."""
+        """Add a label if no statement of the line could be read, so that jumps to it cause no further errors."""
         if self._number is not None:
             self.add(Label(span=span))
 
     def add(self, statement: Statement) -> None:
-        """Add a statement to the innermost block, with the line number that waits."""
+        """Add a statement to the innermost block, with the pending line number."""
         self._top.statements.append(dataclasses.replace(statement, number=self._number))
         self._number = None
 
@@ -97,7 +97,7 @@ class FrameStack:
         self._frames.append(Frame(word, None, span, self._reporter.statement, around, doubtful=doubtful))
 
     def close_all(self) -> None:
-        """Report and close every block that is still open at the end of the text; the END there stays the task's."""
+        """Report and close every block that is still open at the end of the text; an END there belongs to the task."""
         ends: list[Statement] = []
         while self._frames:
             statements = self._top.statements
@@ -108,13 +108,13 @@ class FrameStack:
             ends.clear()
 
     def abandon(self) -> list[Statement]:
-        """Close silently what is open and return the task's statements."""
+        """Close all open blocks silently and return the task's statements."""
         while self._frames:
             self._pop()
         return self._module.body
 
     def begin_else(self, cursor: Cursor, span: Span) -> None:
-        """ELSE on a line of its own."""
+        """Begin the ELSE branch, for an ELSE alone on its line."""
         self._close_inner("IF")
         frame = self._top
         if frame.word != "IF" or frame.otherwise is not None:
@@ -123,7 +123,7 @@ class FrameStack:
         _turn_to_else(frame)
 
     def end_if(self, cursor: Cursor, span: Span) -> None:
-        """END_IF: its line number becomes a label after the block."""
+        """Close an IF; the line number of END_IF becomes a label after the block."""
         self._close_inner("IF")
         if self._top.word != "IF":
             cursor.position -= 1
@@ -132,7 +132,7 @@ class FrameStack:
         self._label(span)
 
     def next(self, cursor: Cursor, variable: Reference, span: Span) -> None:
-        """NEXT: its line number becomes a label at the end of the loop's body."""
+        """Close a FOR; the line number of NEXT becomes a label at the end of the loop's body."""
         matching = next((frame for frame in reversed(self._frames) if _loops_over(frame, variable.name)), None)
         if matching is not None:
             while self._top is not matching:
@@ -150,7 +150,7 @@ class FrameStack:
         self._pop()
 
     def close_quietly(self, word: str, span: Span) -> None:
-        """Take a wrong ELSE, END_IF or NEXT for what it should be, if it fits."""
+        """Treat a misspelt ELSE, END_IF or NEXT as the correct one, if it fits."""
         frame = self._top
         if frame.word == "IF" and word == "ELSE" and frame.otherwise is None:
             self._label(span)
@@ -171,7 +171,7 @@ class FrameStack:
         self._top.statements.extend(frame.closed())
 
     def _close_inner(self, word: str) -> None:
-        """Close the blocks inside the innermost one of a kind; nothing where there is none of that kind."""
+        """Close the blocks inside the innermost one of a kind, if there is one."""
         if any(frame.word == word for frame in reversed(self._frames)):
             while self._top.word != word:
                 self._close_unended()
@@ -189,7 +189,7 @@ class FrameStack:
             self._reporter.statement = in_force
         self._pop()
         if frame.doubtful:
-            # The end that was taken for the doubtful block may have been the one of the block around it.
+            # The end that closed the doubtful block may have been that of the block around it.
             self._top.doubtful = True
 
     def _refuse_else(self, cursor: Cursor, frame: Frame) -> None:

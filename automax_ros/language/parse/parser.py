@@ -1,4 +1,4 @@
-"""Text to syntax tree: the driver, which reads statement by statement and goes on after a wrong one."""
+"""Parses a text to a syntax tree: reads statement by statement and continues after a wrong one."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ STATEMENT_LIMIT = 8192
 def parse(source: SourceText) -> tuple[Module, list[Diagnostic]]:
     """Return the tree of a task and the problems of its text; never raises, whatever the text.
 
-    Where there are errors the tree has the statements that could be read. The source's name
-    tells the kind of task.
+    Where there are errors the tree has the statements that could be read. The source's name gives the kind of task.
     """
     reporter = Reporter()
     if len(source.text) > SOURCE_LIMIT:
@@ -92,7 +91,7 @@ class _TaskParser:
             self._reporter.report(error.fault, error.span, error.notes)
 
     def _too_long(self, cursor: Cursor, line: LogicalLine) -> bool:
-        """Report a statement that is too long, before anything looks at it."""
+        """Report a statement that is too long, before it is parsed."""
         first = cursor.current
         index = cursor.position
         while not cursor.tokens[index].kind.ends_segment:

@@ -1,4 +1,4 @@
-"""Statements as they stand in a task: assignments, simple statements, IF in both forms, FOR and NEXT."""
+"""Reads the statements of a task: assignments, simple statements, IF in both forms, FOR and NEXT."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class StatementReader:
         return self._frames.add(self._simple(cursor))
 
     def recover(self, cursor: Cursor, start: int) -> None:
-        """Step after a statement that could not be read, and open or close the block that it meant."""
+        """Move past a statement that could not be read, and open or close the block that was meant."""
         first = cursor.tokens[start]
         failed, cursor.position = cursor.position, start
         word = first.text if first.kind is Kind.WORD else ""
@@ -77,7 +77,7 @@ class StatementReader:
                     self._frames.close_quietly(end, first.span)
 
     def _recover_if(self, cursor: Cursor, first: Token, failed: int) -> None:
-        """Tell by what stands on its line whether a wrong IF began a block."""
+        """Decide by the rest of its line whether a wrong IF begins a block, and open it."""
         assigns = cursor.tokens[failed].is_name and cursor.tokens[min(failed + 1, len(cursor.tokens) - 1)].text == "="
         texts = []
         while not cursor.at_end():
@@ -115,7 +115,7 @@ class StatementReader:
         return dataclasses.replace(statement, span=_span(cursor, start))
 
     def _reader(self, cursor: Cursor) -> Callable[[Cursor, Token], Statement] | None:
-        """Return what reads the statement that a word begins, None where the word names a variable or nothing."""
+        """Return the reader of the statement that a word begins, None where the word names a variable or nothing."""
         word = cursor.current.text
         table = _STATEMENTS[self._kind]
         if word in RESERVED_WORDS:
@@ -154,7 +154,7 @@ class StatementReader:
         return If(condition, then, otherwise, True, span=_span(cursor, start))
 
     def _branch(self, cursor: Cursor, depth: int) -> tuple[Statement, ...]:
-        """Read what stands after THEN or ELSE on one line: a line number, or statements up to ELSE or the end."""
+        """Read a branch after THEN or ELSE on one line: a line number, or statements up to ELSE or the end."""
         statements: list[Statement] = []
         while True:
             statements.append(self._branch_statement(cursor, depth))
@@ -229,7 +229,7 @@ class StatementReader:
 
 
 def _span(cursor: Cursor, start: int) -> Span:
-    """Return the span from a token to the last one read that stands on the same physical line."""
+    """Return the span from a token to the last read one on the same physical line."""
     first = cursor.tokens[start].span
     index = max(cursor.position - 1, start)
     if cursor.tokens[index].span.line != first.line:
@@ -252,7 +252,7 @@ def _assigns(cursor: Cursor) -> bool:
 
 
 def _assigned_behind_parenthesis(cursor: Cursor) -> bool:
-    """Return whether `=` stands after the closing parenthesis: else NAME(WORD = ... is a block without its CALL."""
+    """Return whether `=` follows the closing parenthesis: else NAME(WORD = ... is a block without its CALL."""
     depth = 0
     for index in range(cursor.position + 1, len(cursor.tokens) - 1):
         token = cursor.tokens[index]

@@ -1,11 +1,4 @@
-"""Simple statements: everything but IF, FOR and their ends.
-
-CALL of a control block (3.1).
-
-The line number that a jump names.
-
-What PRINT prints.
-"""
+"""Parses the simple statements: all but IF, FOR and their ends; among them CALL of a control block (3.1)."""
 
 from __future__ import annotations
 
@@ -39,7 +32,7 @@ from automax_ros.language.tree.tree import (
 
 
 def call(cursor: Cursor, start: Token) -> Call:
-    """Read block(KEYWORD = value, ...)."""
+    """Read block(KEYWORD = value, ...), after CALL."""
     if cursor.current.kind is not Kind.WORD:
         cursor.fail("AMX0070", f"{start.text} needs the name of a block, not {cursor.found()}")
     block = cursor.advance()
@@ -124,7 +117,7 @@ def _set(cursor: Cursor, start: Token) -> SetEvent:
 
 
 def assignment(cursor: Cursor) -> Assignment:
-    """Read target = value; LET has been read."""
+    """Read target = value; LET has already been read."""
     left = target(cursor, "an assignment")
     if not cursor.at("="):
         hint = "names have no blanks" if cursor.current.is_name else None
@@ -241,4 +234,4 @@ SIMPLE_STATEMENTS: dict[str, Callable[[Cursor, Token], Statement]] = {
     "CALL": call,
     "SET": _set,
 }
-"""How each simple statement is read after its first word; SET may name a variable all the same."""
+"""The parser of each simple statement, called after its first word; SET may also be the name of a variable."""

@@ -1,4 +1,4 @@
-"""Statements that the language does not have, or not here: each gets an answer of its own."""
+"""Refuses statements that the language does not have, or not in this kind of task, each with a specific error."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ FOREIGN_WORDS = {
 
 
 def refuse_word(cursor: Cursor, kind: TaskKind) -> None:
-    """Raise the fitting error for a word that begins no statement of this kind of task, before it is read."""
+    """Raise the specific error for a word that begins no statement of this kind of task, before it is read."""
     word = cursor.current.text
     if cursor.following.text == "=":
         if word in RESERVED_WORDS:
@@ -57,7 +57,7 @@ def refuse_word(cursor: Cursor, kind: TaskKind) -> None:
 
 
 def refuse_statement(cursor: Cursor) -> NoReturn:
-    """Raise the error for something that begins no statement at all."""
+    """Raise the error for a token that begins no statement at all."""
     token = cursor.current
     hint: str | None = None
     if token.kind is Kind.WORD:

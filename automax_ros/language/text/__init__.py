@@ -1,1 +1,1 @@
-"""Characters to tokens and logical lines."""
+"""Splits a text into tokens and logical lines."""

@@ -1,4 +1,4 @@
-"""Constants (2.4.2): their values, and what can be wrong with them."""
+"""Constants (2.4.2): their values and faults."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def integer_value(text: str) -> tuple[int, SourceFault | None]:
 
 
 def real_fault(text: str) -> SourceFault | None:
-    """Return what is wrong with a real constant; its sign is not known yet."""
+    """Return the fault of a real constant; its sign is not known yet."""
     mantissa = text.partition("E")[0].replace(".", "")
     digits = len(mantissa.lstrip("0"))
     if digits > REAL_DIGITS:
@@ -53,7 +53,7 @@ def real_fault(text: str) -> SourceFault | None:
 
 
 def string_fault(value: str) -> SourceFault | None:
-    """Return what is wrong with a string constant."""
+    """Return the fault of a string constant."""
     if len(value) > STRING_LIMIT:
         return SourceFault("AMX0021", f"a string constant has at most {STRING_LIMIT} characters, here {len(value)}")
     bad = next((char for char in value if char != "\t" and not char.isprintable()), None)

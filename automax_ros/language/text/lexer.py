@@ -1,7 +1,7 @@
-"""Characters to tokens, one physical line at a time.
+"""Splits characters into tokens, one physical line at a time.
 
-Linear in the length of the line whatever it holds. A `!` glued to a preceding name is its type character, otherwise
-it begins a remark; lower case is read as upper case (decisions).
+The time is linear in the length of the line, whatever its content. A `!` directly after a name is its type character,
+otherwise it begins a remark; lower case is read as upper case (decisions).
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ _FOREIGN = {
 _PLAIN = {"mark": Kind.MARK, "separator": Kind.SEPARATOR}
 TYPE_CHARACTERS = "%!@$"
 BROKEN_END = "&!"
-"""Text of an ERROR token after which the statement goes on in the next line all the same."""
+"""Text of an ERROR token after which the statement still continues in the next line."""
 
 
 class LineLexer:
-    """Turns physical lines into tokens and remembers the first lower-case letter of the text."""
+    """Splits physical lines into tokens and stores the place of the first lower-case letter of the text."""
 
     def __init__(self) -> None:
         self.lower_case: Span | None = None
@@ -83,7 +83,7 @@ class LineLexer:
         return result
 
     def remark(self, text: str, line: int, start: int, mark: str) -> Token:
-        """Return the remark that goes from index ``start`` to the end of the line; its text begins after ``mark``."""
+        """Return the remark from index ``start`` to the end of the line; its text begins after ``mark``."""
         body = text[start + len(mark) :].strip(BLANKS)
         end = len(text.rstrip(BLANKS))
         return Token(Kind.REMARK, mark.upper(), line, start + 1, max(end, start + 1) + 1, value=body)
@@ -187,7 +187,7 @@ def _ampersand(text: str, here: Span) -> Token:
     hint = "a remark may stand on the statement's first or last line" if remark else "`and` is written AND"
     if rest[0] in "Hh":
         hint = "a hexadecimal constant is written 0FFH"
-    # A remark after the `&` shows that a continuation was meant: the statement goes on, with this one fault.
+    # A remark after the `&` shows that a continuation was meant: the statement continues, with this one fault.
     end = len(text) + 1 if remark else here.end_column
     span = Span(here.line, here.column, end)
     return _error(BROKEN_END if remark else "&", span, "AMX0015", "`&` is not the last character of its line", hint)

@@ -1,7 +1,7 @@
-"""Physical lines to logical lines: line numbers and `&` continuation.
+"""Joins physical lines to logical lines: line numbers and `&` continuation.
 
 Every line begins with a line number, 1 to 32767, in ascending order (decision). A line whose last character is
-`&` goes on in the next physical line that is not blank, which has no number.
+`&` continues in the next physical line that is not blank, which has no number.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ END_OF_FILE = "\x1a"
 class LogicalLine:
     """One numbered line with its continuations.
 
-    ``number`` is None where it is missing. ``faulty`` tells that the line as such was reported already.
+    ``number`` is None where it is missing. ``faulty`` means that a fault of the line itself was already reported.
     """
 
     number: int | None
@@ -40,7 +40,7 @@ class LogicalLine:
 
 
 class LineReader:
-    """Reads a text line by line and reports what is wrong with numbers and continuations."""
+    """Reads a text line by line and reports faults of line numbers and continuations."""
 
     def __init__(self, source: SourceText, reporter: Reporter) -> None:
         text = source.text.partition(END_OF_FILE)[0].rstrip("\r\n")
@@ -54,7 +54,7 @@ class LineReader:
         self.lexer = LineLexer()
 
     def __iter__(self) -> Iterator[LogicalLine]:
-        """Yield the logical lines; each is reported on before it is yielded."""
+        """Yield the logical lines; the faults of each are reported before it is yielded."""
         while (index := self._next_written(self._index)) is not None:
             self._index = index
             yield self._logical_line()
@@ -109,7 +109,7 @@ class LineReader:
         self._reporter.report(fault, first.span)
 
     def _assemble(self, line: LogicalLine, start: int) -> None:
-        """Fill in the tokens of a logical line, ended by an END token, and step to the line after it."""
+        """Fill in the tokens of a logical line, ended by an END token, and move to the line after it."""
         tokens = line.tokens
         nesting = _Nesting()
         remark: list[str] = []

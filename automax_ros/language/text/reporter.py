@@ -10,11 +10,11 @@ DIAGNOSTIC_LIMIT = 200
 
 
 class TooManyProblemsError(Exception):
-    """Ends the parse of a text that has more problems than anybody reads."""
+    """Ends the parse of a text that has more than DIAGNOSTIC_LIMIT problems."""
 
 
 class SyntaxFaultError(Exception):
-    """Ends the parse of one statement; carries what is wrong and where."""
+    """Ends the parse of one statement; has the fault and its place."""
 
     def __init__(self, fault: SourceFault, span: Span, notes: tuple[Note, ...] = ()) -> None:
         super().__init__(fault.message)
@@ -39,6 +39,6 @@ class Reporter:
         self.diagnostics.append(Diagnostic(fault.code, fault.message, span, self.statement, fault.hint, notes))
 
     def report_token(self, token: Token) -> None:
-        """Add the fault that a token carries, if any."""
+        """Add the fault of a token, if any."""
         if token.fault is not None:
             self.report(token.fault, token.span)

@@ -1,4 +1,4 @@
-"""What the lexer hands to the parser: tokens, each with its place and, where it is wrong, its fault."""
+"""Tokens, which the lexer passes to the parser, each with its place and, where it is wrong, its fault."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from automax_ros.core.diagnostics import Span
 
 
 class Kind(enum.Enum):
-    """The kinds of tokens; the values are what messages call them."""
+    """The kinds of tokens; the values are their names in messages."""
 
     WORD = "word"
     NAME = "name with type character"
@@ -36,7 +36,7 @@ class Kind(enum.Enum):
 
 
 class SourceFault(NamedTuple):
-    """A problem that a token carries until the parser meets it."""
+    """A problem of a token, which the parser reports when it reads the token."""
 
     code: str
     message: str
@@ -47,7 +47,7 @@ class Token(NamedTuple):
     """A token. ``text`` is in upper case and without blanks, ``value`` the value of a constant or the text of a remark.
 
     ``offset`` counts the characters of the logical line before it. A ``fault`` on an ERROR token ends its statement;
-    on any other kind it is reported and the token taken for what it is.
+    on any other kind it is reported and the token is used as usual.
     """
 
     kind: Kind

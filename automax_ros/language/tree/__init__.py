@@ -1,1 +1,1 @@
-"""The syntax tree of a task, and data that parsing and checking share."""
+"""The syntax tree of a task, and data shared by parsing and checking."""

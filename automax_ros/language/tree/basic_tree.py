@@ -20,13 +20,13 @@ class Unit(enum.Enum):
     HOURS = "HOURS"
 
     def ns(self, tick_ns: int) -> int:
-        """Return one of it in ns, on a Processor with this tick."""
+        """Return one unit in ns, on a Processor with this tick."""
         seconds = {Unit.SECONDS: 1, Unit.MINUTES: 60, Unit.HOURS: 3600}
         return tick_ns if self is Unit.TICKS else seconds[self] * NS_PER_S
 
 
 class Direction(enum.Enum):
-    """Which end of a channel a task opens."""
+    """The end of a channel that a task opens."""
 
     INPUT = "INPUT"
     OUTPUT = "OUTPUT"
@@ -44,7 +44,7 @@ ITEM_TYPES = {
 
 @dataclass(frozen=True)
 class SetEvent:
-    """SET event: raises it."""
+    """SET event: sets the event."""
 
     event: str
     number: int | None = field(default=None, kw_only=True)
@@ -72,7 +72,7 @@ class Delay:
 
 @dataclass(frozen=True)
 class StartEvery:
-    """START EVERY count unit: after END the task goes on at the statement after this one, each period."""
+    """START EVERY count unit: after END the task continues at the statement after this one, once per period."""
 
     count: Expression
     unit: Unit
@@ -116,7 +116,7 @@ class Close:
 
 @dataclass(frozen=True)
 class InputFile:
-    """INPUT[:EMPTY=line] #file, targets: one message of a channel; with none there it goes to the line ``empty``."""
+    """INPUT[:EMPTY=line] #file, targets: one message of a channel; if there is none, a jump to the line ``empty``."""
 
     file: int
     targets: tuple[Target, ...]

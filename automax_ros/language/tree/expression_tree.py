@@ -1,4 +1,4 @@
-"""The expressions of the syntax tree, and what all its nodes share.
+"""The expressions of the syntax tree, and the span that all its nodes have.
 
 Every node carries the span of its text; spans (and the spelling of constants) do not take part in equality,
 so that a printed tree parses back to an equal one.
@@ -15,7 +15,7 @@ NO_SPAN = Span(0, 0, 0)
 
 
 def span_field() -> Span:
-    """Return a span field's default: nodes made by hand have none."""
+    """Return a span field with its default, for nodes made without a text."""
     return field(default=NO_SPAN, compare=False, kw_only=True)
 
 
@@ -62,7 +62,7 @@ class Reference:
 
     @property
     def type(self) -> DataType:
-        """The data type, which the name gives."""
+        """The data type, given by the name."""
         return type_of_name(self.name)
 
 
@@ -76,7 +76,7 @@ class Element:
 
     @property
     def type(self) -> DataType:
-        """The data type that the array's name tells."""
+        """The data type, given by the array's name."""
         return type_of_name(self.name)
 
 

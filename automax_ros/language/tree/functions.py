@@ -1,6 +1,6 @@
 """The functions of the language, as data: names, arguments, results, where they may be used.
 
-The manuals at hand describe hardly any of them: names, arguments and results are ours unless a source is named
+The available manuals describe hardly any of them: names, arguments and results are ours unless a source is named
 (decision).
 """
 
@@ -13,7 +13,7 @@ from automax_ros.core.types import DataType
 
 
 class Argument(enum.Enum):
-    """What an argument must be."""
+    """Kind of an argument."""
 
     NUMBER = "number"
     INTEGER = "integer"

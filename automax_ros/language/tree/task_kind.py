@@ -1,4 +1,4 @@
-"""The kinds of tasks, and how a file's name tells them: the one place that decides it (J-3675 p. 3-1)."""
+"""The kinds of tasks, and the only place that derives them from a file's name (J-3675 p. 3-1)."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class NotATask(ValueError):
 
 
 def kind_of_file(name: str | PurePath) -> TaskKind:
-    """Return the kind of task that a file holds, by its suffix in either case.
+    """Return the kind of task of a file, by its suffix in either case.
 
     Raises:
-        NotATask: the file is none, or of a kind that is not run.
+        NotATask: the file is not a task, or of a kind that is not run.
     """
     suffix = PurePath(name).suffix.upper()
     if suffix in TASK_SUFFIXES:
@@ -40,10 +40,10 @@ def kind_of_file(name: str | PurePath) -> TaskKind:
 
 
 def kind_of_source(name: str) -> TaskKind:
-    """Return the kind of task that a text is, by its name; any name but a BASIC task's means control blocks."""
+    """Return the kind of task of a text, by its name; any name but a BASIC task's means control blocks."""
     return TaskKind.BASIC if PurePath(name).suffix.upper() == TaskKind.BASIC.value else TaskKind.CONTROL_BLOCK
 
 
 def is_task_file(name: str | PurePath) -> bool:
-    """Return whether a file's name is that of a task that can run."""
+    """Return whether a file has the name of a task that can run."""
     return PurePath(name).suffix.upper() in TASK_SUFFIXES

@@ -99,7 +99,7 @@ class Declared:
 
     @property
     def type(self) -> DataType:
-        """The data type, which the name gives."""
+        """The data type, given by the name."""
         return type_of_name(self.name)
 
 
@@ -132,7 +132,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class If:
-    """IF condition THEN ... [ELSE ...] [END_IF]. ``one_line`` tells the form; ``IF c THEN 200`` holds a Goto."""
+    """IF condition THEN ... [ELSE ...] [END_IF]. ``one_line`` is the form; ``IF c THEN 200`` contains a Goto."""
 
     condition: Expression
     then: tuple[Statement, ...]
@@ -212,7 +212,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Restore:
-    """RESTORE [line]: READ goes on at the first DATA of the task, or at the first from that line on."""
+    """RESTORE [line]: READ continues at the first DATA of the task, or at the first from that line on."""
 
     line: int | None = None
     number: int | None = field(default=None, kw_only=True)
@@ -306,10 +306,10 @@ class Remark:
 
 @dataclass(frozen=True)
 class Label:
-    """A numbered line that does nothing but can be jumped to.
+    """A numbered line that does nothing but can be the target of a jump.
 
-    The lines of ELSE, END_IF and NEXT leave one: ELSE as the last statement of ``then``, NEXT as the last of the loop's
-    body (a jump there takes the next turn), END_IF after the If. A line with a number alone is one too.
+    The lines of ELSE, END_IF and NEXT give one: ELSE as the last statement of ``then``, NEXT as the last of the loop's
+    body (a jump there takes the next turn), END_IF after the If. A line with only a number is one too.
     """
 
     number: int | None = field(default=None, kw_only=True)
@@ -346,7 +346,7 @@ Statement = (
 class Module:
     """A whole task: its statements in order.
 
-    ``number`` of a statement is the line number that stands before it, None for a further statement of the same line.
+    ``number`` of a statement is the line number before it, None for a further statement of the same line.
     """
 
     statements: tuple[Statement, ...]

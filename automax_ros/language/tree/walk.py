@@ -1,4 +1,4 @@
-"""Walks over a syntax tree that the checker's parts share."""
+"""Walks over a syntax tree, shared by the checker's parts."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def targets_of(statement: Statement) -> tuple[Target, ...]:
 
 
 def jumps_of(statement: Statement) -> tuple[int, ...]:
-    """Return the lines that a statement itself may go to, those inside it not included."""
+    """Return the lines to which a statement itself may jump, without those of statements inside it."""
     if isinstance(statement, (Goto, Gosub)):
         return (statement.line,)
     if isinstance(statement, OnJump):

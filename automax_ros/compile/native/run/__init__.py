@@ -1,1 +1,1 @@
-"""C to a shared library, and its functions called scan by scan or by columns."""
+"""Builds a shared library from C, and calls its functions scan by scan or by columns."""

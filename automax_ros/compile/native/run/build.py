@@ -1,4 +1,4 @@
-"""C text to a shared library: the compiler, its options, and what a library's name in the cache depends on."""
+"""Builds a shared library from a C text: the compiler, its options, and the library's name in the cache."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from automax_ros.compile.native.run.cache import NativeCache
 from automax_ros.compile.native.run.compiler_process import LIMIT_S, MADE, run_compiler
 
 FLAGS = ("-std=c11", "-ffp-contract=off", "-fno-fast-math", "-fwrapv", "-fPIC", "-shared")
-"""Nothing among them changes bits: no fused multiply-add, and integers that overflow wrap around."""
+"""None of these changes bits: no fused multiply-add, and integers that overflow wrap around."""
 LONG_TEXT = 200_000
 """Characters from which on a text is compiled at -O1, not -O2 (decision).
 
-A task of 2,000 lines, a million characters, takes 5 s and not 15, and scans as quickly within a few percent.
+A task of 2,000 lines, a million characters, then takes 5 s instead of 15, and scans as fast within a few percent.
 """
 MOST_TEXT = 4_000_000
-"""Characters of a text that is compiled (decision): a task of 8,000 lines, and 1 GB of memory for the compiler."""
+"""Most characters of a text that is compiled (decision): a task of 8,000 lines, and 1 GB of memory for the compiler."""
 _USUAL = ("cc", "gcc", "clang")
 
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler: its path, what it says it is, and the folders in which it finds its helpers."""
+    """A C compiler: its path, the version that it prints, and the folders in which it finds its helpers."""
 
     path: str
     version: str
@@ -39,12 +39,12 @@ class Compiler:
 
 
 def find_compiler(limit_s: float = LIMIT_S) -> Compiler:
-    """Return the compiler that CC names, a whole path or a name on PATH, or cc, gcc or clang.
+    """Return the compiler that CC names, as an absolute path or a name on PATH, or cc, gcc or clang.
 
     Raises:
         NotNative: there is none, or CC names none.
     """
-    # A relative folder on PATH is a compiler that whoever wrote the working folder has put there.
+    # In a relative folder on PATH anyone who can write the working folder could have put a compiler.
     search = os.pathsep.join(part for part in os.environ.get("PATH", "").split(os.pathsep) if os.path.isabs(part))
     named = os.environ.get("CC", "")
     if named and os.sep in named and not os.path.isabs(named):
@@ -58,7 +58,7 @@ def find_compiler(limit_s: float = LIMIT_S) -> Compiler:
 
 
 def require_tools(limit_s: float = LIMIT_S) -> None:
-    """Look for all that a native task is built with.
+    """Check for all tools needed to build a native task.
 
     Raises:
         NotNative: there is no compiler, or ``Python.h`` is missing.
@@ -70,10 +70,10 @@ def require_tools(limit_s: float = LIMIT_S) -> None:
 def library(
     text: str, cache: NativeCache, options: Sequence[str] = (), limit_s: float = LIMIT_S, *, builds: bool = True
 ) -> Path:
-    """Return the library of a C text: from the cache or, if it ``builds``, made now and kept there.
+    """Return the library of a C text: from the cache or, if ``builds``, built now and cached.
 
     Raises:
-        NotNative: no compiler, it fails, lacks memory or time, the text is too long, or the cache not safe.
+        NotNative: there is no compiler, it fails, lacks memory or time, the text is too long, or the cache not safe.
     """
     if len(text) > MOST_TEXT:
         raise NotNative(f"its C text would have {len(text):,} characters, more than {MOST_TEXT:,}")
@@ -87,7 +87,7 @@ def library(
 
 
 def level_of(text: str) -> str:
-    """Return the compiler's option for how much it does to make a text quick."""
+    """Return the compiler's optimization level for a text."""
     return "-O1" if len(text) >= LONG_TEXT else "-O2"
 
 
@@ -98,10 +98,10 @@ def key_of(text: str, compiler: Compiler, options: Sequence[str] = ()) -> str:
 
 
 def build(text: str, compiler: Compiler, options: Sequence[str] = (), limit_s: float = LIMIT_S) -> bytes:
-    """Return a library as the compiler makes it of a text.
+    """Return the library that the compiler builds from a text.
 
     Raises:
-        NotNative: the compiler fails, has not enough memory, or takes longer than ``limit_s`` s.
+        NotNative: the compiler fails, does not have enough memory, or takes longer than ``limit_s`` s.
     """
     command = [compiler.path, *FLAGS, *options, "-x", "c", "-", "-o", MADE, "-lm"]
     made = run_compiler(command, compiler.search, text, limit_s).made
@@ -111,7 +111,7 @@ def build(text: str, compiler: Compiler, options: Sequence[str] = (), limit_s: f
 
 
 def python_options() -> tuple[str, ...]:
-    """Return the options for a text that includes ``Python.h``; this interpreter's binary interface is among them.
+    """Return the options for a text that includes ``Python.h``, including this interpreter's binary interface.
 
     Raises:
         NotNative: it is not installed.
@@ -124,7 +124,7 @@ def python_options() -> tuple[str, ...]:
 
 
 def _stamp(path: str) -> tuple[int, int]:
-    """Return what changes with a compiler: time and size of its file."""
+    """Return time and size of a compiler's file, which change with the compiler."""
     known = os.stat(path)
     return known.st_mtime_ns, known.st_size
 

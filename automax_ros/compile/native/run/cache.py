@@ -1,11 +1,11 @@
-"""The user's cache of native code: shared libraries and texts, by the hash of all that they are made of.
+"""The user's cache of native code: shared libraries and texts, by the hash of all their inputs.
 
-Code that somebody else can write is never loaded: the folder, what lies above it and each file belong to the user (or,
-above the folder, to root) and nobody else can write them; symbolic links are not followed. A file ends with the SHA-256
-of what stands before that, so that a damaged one is built again and never loaded.
+Code that other users can write is never loaded: the folder, its parents and each file belong to the user (or, above the
+folder, to root) and are writable only by the owner; symbolic links are not followed. A file ends with the SHA-256 of
+its content, so that a damaged one is built again and never loaded.
 
-Files are written under a name of their own and renamed when they are whole: two processes that build the same at once
-both end with a whole file, and one that is killed leaves only a name that is cleared away later.
+Files are written under a temporary name and renamed when they are complete: if two processes build the same file at
+once, both get a complete one, and a process that is killed leaves only a temporary file that is removed later.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from automax_ros.compile.base.native_source import NotNative
 
 FOLDER = "automax_ros"
 MOST_BYTES = 256 << 20
-"""Size that a cache may have; what was not used for longest goes first (decision)."""
+"""Largest size of a cache, bytes; the least recently used files are removed first (decision)."""
 STALE_S = 3600
 """Age after which an unfinished file, or a compiler's folder, is taken for that of a killed process, s (decision)."""
 _LIBRARY, _TEXT, _UNFINISHED = ".so", ".text", ".unfinished"
@@ -49,7 +49,7 @@ def user_folder() -> Path:
 
 @dataclass(frozen=True)
 class NativeCache:
-    """A cache in a folder, the user's if none is named. ``most_bytes`` is the size that it may have."""
+    """A cache in a folder, by default the user's; ``most_bytes`` is its largest size."""
 
     folder: Path | None = None
     most_bytes: int = MOST_BYTES
@@ -58,32 +58,32 @@ class NativeCache:
         """Return the library of a key, checked and safe to load, None where there is none or only a damaged one.
 
         Raises:
-            NotNative: somebody else can write what would be loaded.
+            NotNative: other users can write the file or a folder of it.
         """
         place = self._place() / (key + _LIBRARY)
         return None if _content(place) is None else place
 
     def read(self, key: str) -> bytes | None:
-        """Return the text that is kept under a key, None where there is none or only a damaged one.
+        """Return the text cached under a key, None where there is none or only a damaged one.
 
         Raises:
-            NotNative: somebody else can write it.
+            NotNative: other users can write it.
         """
         return _content(self._place() / (key + _TEXT))
 
     def store(self, key: str, library: bytes) -> Path:
-        """Keep a library; return where it lies.
+        """Store a library; return its path.
 
         Raises:
-            NotNative: it cannot be written there, or somebody else could write it.
+            NotNative: it cannot be written, or other users could write it.
         """
         return self._store(key + _LIBRARY, library)
 
     def keep(self, key: str, text: bytes) -> None:
-        """Keep a text.
+        """Store a text.
 
         Raises:
-            NotNative: it cannot be written there, or somebody else could write it.
+            NotNative: it cannot be written, or other users could write it.
         """
         self._store(key + _TEXT, text)
 
@@ -100,7 +100,7 @@ class NativeCache:
     def _place(self) -> Path:
         folder = user_folder() if self.folder is None else self.folder
         try:
-            for part in (*reversed(folder.parents), folder):  # mkdir(parents=True) would let the group write them
+            for part in (*reversed(folder.parents), folder):  # mkdir(parents=True) could make them group-writable
                 if not part.exists():
                     with contextlib.suppress(FileExistsError):
                         part.mkdir(mode=0o700)
@@ -125,7 +125,7 @@ class NativeCache:
             raise
 
     def _make_room(self, folder: int, kept: str) -> None:
-        """Remove what killed processes have left, then the oldest files until the others fit."""
+        """Remove remains of killed processes, then the oldest files until the others fit."""
         total, now = 0, os.stat(kept, dir_fd=folder).st_mtime
         for _, size, name in sorted(_files(folder, now), reverse=True):
             total += size
@@ -135,7 +135,7 @@ class NativeCache:
 
 
 def _files(folder: int, now: float) -> Iterator[tuple[float, int, str]]:
-    """Yield time, size and name of each file; remove what is unfinished and old; ``now`` as files have it, s."""
+    """Yield time, size and name of each file; remove old unfinished ones; ``now`` in the time of the files, s."""
     for name in os.listdir(folder):
         with contextlib.suppress(FileNotFoundError):
             known = os.stat(name, dir_fd=folder, follow_symlinks=False)
@@ -147,7 +147,7 @@ def _files(folder: int, now: float) -> Iterator[tuple[float, int, str]]:
 
 @contextlib.contextmanager
 def _opened(place: Path) -> Iterator[int]:
-    """Open the folder, which is ours alone, as is what lies above it."""
+    """Open the folder after checking that only its owner can write it and its parents."""
     for above in place.parents:
         _require_safe_above(above)
     try:
@@ -172,9 +172,9 @@ def _require_own(known: os.stat_result, path: Path, is_kind: object) -> None:
 
 
 def _require_safe_above(path: Path) -> None:
-    """Refuse a folder in which somebody else could put another in place of the cache.
+    """Refuse a folder in which other users could replace the cache.
 
-    In one with the sticky bit, such as /tmp, nobody can move what belongs to others.
+    In one with the sticky bit, such as /tmp, users cannot move the files of others.
     """
     known = path.stat()
     if known.st_uid not in (0, os.geteuid()):
@@ -184,7 +184,7 @@ def _require_safe_above(path: Path) -> None:
 
 
 def _content(path: Path) -> bytes | None:
-    """Return what a file of the cache holds, None where it is not there or damaged; mark it as used."""
+    """Return the content of a file of the cache, None where it is missing or damaged; mark it as used."""
     with _opened(path.parent) as folder:
         try:
             file = os.open(path.name, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK, dir_fd=folder)
@@ -204,7 +204,7 @@ def _content(path: Path) -> bytes | None:
 
 
 def _digest(name: str, content: bytes) -> bytes:
-    """Return the digest of a file of the cache: its name counts, or one could stand in for another."""
+    """Return the digest of a file of the cache; it includes the name, or one file could replace another."""
     return hashlib.sha256(name.encode() + b"\0" + content).digest()
 
 

@@ -1,7 +1,4 @@
-"""Many scans of a native task in one call: latched values by columns in, values at END by columns out.
-
-What scans by columns are given and what they give.
-"""
+"""Executes many scans of a native task in one call: columns of latched values in, columns of values at END out."""
 
 from __future__ import annotations
 
@@ -23,10 +20,10 @@ Column = npt.NDArray[np.int64] | npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BesideLatch:
-    """What scans read and wrote in actual memory: scan k has the rows ``offsets[k]`` to ``offsets[k + 1]``.
+    """The reads and writes of scans in actual memory: scan k has the rows ``offsets[k]`` to ``offsets[k + 1]``.
 
-    Values are doubles, which hold integers of 32 bits and REALs exactly. Without ``write_offsets`` what scans write is
-    not compared.
+    Values are doubles, which hold integers of 32 bits and REALs exactly. Without ``write_offsets`` the writes of scans
+    are not compared.
     """
 
     read_offsets: Whole
@@ -41,7 +38,7 @@ class BesideLatch:
 
 @dataclass(frozen=True)
 class Written:
-    """What scans wrote in actual memory, in order, a row for each write."""
+    """The writes of scans in actual memory, in order, one row per write."""
 
     scans: Whole
     views: Whole
@@ -51,14 +48,14 @@ class Written:
 
 @dataclass(frozen=True)
 class Executed:
-    """What scans by columns came to.
+    """The result of scans by columns.
 
     Attributes:
-        done: scans executed whole. Where that is less than was asked for, the next one stopped, was too long, or did
-            something else than was recorded; the state is that before it.
-        outputs: for each of ``CompiledTask.written`` its values at END of each scan that was done.
+        done: scans executed completely. Where there are fewer than requested, the next one stopped, was too long, or
+            deviated from the recording; the state is that before it.
+        outputs: for each of ``CompiledTask.written`` its values at END of each completed scan.
         errors: a row for each logged error, in order: scan, line, code.
-        written: what the scans wrote in actual memory.
+        written: the writes of the scans in actual memory.
     """
 
     done: int
@@ -70,7 +67,7 @@ class Executed:
 _FULL = 4
 """AUTOMAX_FULL: the room for errors or writes is used up."""
 _ROOM = 4
-"""Errors and writes of a scan that there is room for at first; more is tried where that is not enough."""
+"""Initial room for errors and writes per scan; the call is repeated with more where that is not enough."""
 
 
 class _Rows(ctypes.Structure):
@@ -101,7 +98,7 @@ class Columns:
     """The scans of one library by columns."""
 
     def __init__(self, path: Path, slots: StateSlots, latched_kinds: Sequence[int], written: Sequence[int]) -> None:
-        """Take the library, and which of the latched commons are written.
+        """Load the library; ``written`` are the places of the written commons among the latched ones.
 
         Raises:
             OSError: the library cannot be loaded.
@@ -128,7 +125,7 @@ class Columns:
         slots = before.copy()
         run = self._run(slots, columns, count, actual)
         if run.done < count:
-            # The state is that of no scan: the scans that were whole are executed again, from the state before.
+            # The state is now between two scans: the complete scans are executed again, from the state before.
             slots = before.copy()
             run = self._run(slots, columns, run.done, actual)
         self._slots.put(slots, before, state)
@@ -159,7 +156,7 @@ class Columns:
 
 
 def _require_rows(actual: BesideLatch | None, count: int) -> None:
-    """Refuse rows that the C text would read past their end."""
+    """Refuse rows that the C code would read past their end."""
     if actual is None:
         return
     for offsets, *arrays in (
@@ -174,7 +171,7 @@ def _require_rows(actual: BesideLatch | None, count: int) -> None:
 
 
 class _Run:
-    """One call: its arguments, alive as long as it is, and what came of it."""
+    """One call: its arguments, which must live as long as it, and its results."""
 
     def __init__(
         self, columns: Sequence[Column], kinds: Sequence[int], count: int, actual: BesideLatch | None, room: int
@@ -203,11 +200,11 @@ class _Run:
 
     @property
     def done(self) -> int:
-        """The scans that were whole."""
+        """The number of complete scans."""
         return int(self.call.done)
 
     def executed(self) -> Executed:
-        """Return what came of it."""
+        """Return the result."""
         done, errors, written = self.done, self.call.errors, self.call.written
         scans, views, elements = (item[:written].copy() for item in self._places)
         return Executed(
@@ -228,7 +225,7 @@ class _Run:
 
 
 def _as_column(values: Column, kind: int) -> Column:
-    """Return values of a kind as C takes them: 64 bits each, one after the other."""
+    """Return values of a kind in the form for C: contiguous, 64 bits each."""
     if kind == REAL:
         return np.ascontiguousarray(values, np.float64)
     return np.ascontiguousarray(values, np.int64)

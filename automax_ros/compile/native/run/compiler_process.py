@@ -1,4 +1,4 @@
-"""A C compiler as a process: what it is given, what it may take, and that it ends with whoever has started it."""
+"""Runs a C compiler as a process with limited time and memory, which ends with the process that started it."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.native.run.cache import STALE_S
 
 LIMIT_S = 120.0
-"""Time that the compiler has for one text, s (decision): a task of 2,000 lines takes a few."""
+"""Time limit of the compiler for one text, s (decision): a task of 2,000 lines takes a few."""
 LOOK_S = 0.25
-"""Time after which whoever waits for a compiler looks up, s: Python misses a signal that comes just before a wait."""
+"""Longest single wait for a compiler, s: Python misses a signal that comes just before a wait."""
 LEAST_MEMORY, MEMORY_A_CHARACTER = 1 << 30, 512
 """Address space that each process of the compiler may have, bytes, and what each character of a text adds to that
 (decision: gcc 12 takes 50 MB for a task of 40 blocks, and 300 bytes a character for long ones: 310 MB for 2,000 lines,
 which may have 1.6 GB, and 930 MB for 3,800,000 characters, which may have 3 GB). As many compilers run at a time as
-there are cores, and together they may have half of the memory. Where the machine knows no such limit there is none.
+there are cores, and together they may have half of the memory. A machine that does not support this limit has none.
 """
 FOLDER = "automax_native_"
-"""What the name of a compiler's folder begins with."""
+"""Prefix of the name of a compiler's folder."""
 _SHELL = "/bin/sh"
 _SCRIPT = """
 exec 3<&0
@@ -47,57 +47,57 @@ trap '' TERM
 kill -TERM 0; kill -KILL $!; wait
 exit $code
 """
-"""Limits a compiler, and runs it on what stands in the file ``text`` (decision: it is quick and safe among threads).
+"""Limits a compiler, and runs it on the content of the file ``text`` (decision: it is quick and safe among threads).
 
-It is a shell with a fixed text, which takes no argument apart. It costs 1 ms, an interpreter of Python 9 ms; what
-Python itself can do between fork and exec may hang where there are threads; and limits that are set on a compiler which
-runs already do not reach what it has started by then. The second line waits until nobody holds the other end of
-standard input any more: however we end, be it by SIGKILL, the compiler ends then and its folder goes. What a compiler
-leaves running when it has ended is ended too. No file may have more than 256 MB. A limit that the machine does not
-know, as macOS that of memory, is left out.
+It is a fixed shell script that does not split any argument. A shell costs 1 ms, a Python interpreter 9 ms; Python code
+between fork and exec may hang where there are threads; and limits set on a running compiler do not apply to processes
+that it has already started. The second line waits until the other end of standard input is closed: however our process
+ends, even by SIGKILL, the compiler then ends and its folder is removed. Processes that a compiler leaves running when
+it ends are ended too. No file may have more than 256 MB. A limit that the machine does not support, such as that of
+memory on macOS, is left out.
 """
 MADE = "made.so"
-"""Name under which a compiler leaves the library."""
+"""Name of the library that a compiler makes."""
 _TEXT = "text"
 _MESSAGE = 400
-"""Characters of what the compiler says that are passed on."""
+"""Most characters of the compiler's messages that are passed on."""
 _NOT_RUN = (126, 127)
 """Exit codes of a shell that could not run a program."""
 _NO_MEMORY = (
     *("out of memory", "memory exhausted", "annot allocate memory", "bad_alloc"),
     *("Killed signal terminated", "failed to map segment"),
 )
-"""What gcc, clang, as and ld say when they get no more memory; the last two when the machine has ended them, or has not
-even loaded them."""
+"""Messages of gcc, clang, as and ld when they run out of memory; the last two occur when the machine has killed them or
+could not load them."""
 _CONTAINER_LIMIT = Path("/sys/fs/cgroup/memory.max")
-"""Where Linux tells a container how much memory it may have."""
+"""The file in which Linux gives the memory limit of a container."""
 _RUNNING: dict[io.FileIO, threading.Thread] = {}
-"""What lets the compilers live that are under way, and the threads that wait for them."""
+"""The pipes whose closing ends the running compilers, and the threads that wait for them."""
 _ABANDONED: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
-"""Threads that nobody waits for any more."""
+"""Threads whose results are not needed any longer."""
 
 
 @dataclass(frozen=True)
 class Ran:
-    """What a compiler has printed, and the library that it has made, None if it made none."""
+    """The output of a compiler, and the library that it has made, None if it made none."""
 
     said: str
     made: bytes | None
 
 
 def run_compiler(command: Sequence[str], search: str, text: str = "", limit_s: float = LIMIT_S) -> Ran:
-    """Run a compiler that reads a text from standard input, and return what it has done.
+    """Run a compiler that reads a text from standard input, and return its output and library.
 
-    Of the environment it is given PATH alone: CPATH, LIBRARY_PATH, COMPILER_PATH and the like do not reach it.
+    Its environment has only PATH: CPATH, LIBRARY_PATH, COMPILER_PATH and the like do not reach it.
 
     Args:
-        command: its whole path and its options; the library is ``MADE``.
+        command: its absolute path and its options; the library is ``MADE``.
         search: PATH.
-        text: what it reads.
-        limit_s: time that it has, s; its memory is limited by the length of the text.
+        text: the text that it reads.
+        limit_s: time limit, s; its memory is limited by the length of the text.
 
     Raises:
-        NotNative: it cannot be run, fails, has not enough memory, or takes longer.
+        NotNative: it cannot be run, fails, does not have enough memory, or takes longer.
     """
     memory = memory_of(text)
     with _begun(command, search, text, limit_s, memory) as (process, folder, life):
@@ -109,17 +109,17 @@ def run_compiler(command: Sequence[str], search: str, text: str = "", limit_s: f
 
 
 def memory_of(text: str) -> int:
-    """Return how much address space each process of a compiler may have for a text, bytes."""
+    """Return the limit of the address space of each process of a compiler for a text, bytes."""
     wanted = LEAST_MEMORY + MEMORY_A_CHARACTER * len(text)
     machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    with contextlib.suppress(OSError, ValueError):  # no container, or one that may have all
+    with contextlib.suppress(OSError, ValueError):  # no container, or one without a limit
         machine = min(machine, int(_CONTAINER_LIMIT.read_text()))
     own = [limit for limit in resource.getrlimit(resource.RLIMIT_AS) if limit != resource.RLIM_INFINITY]
     return min(wanted, machine // 2 // (os.cpu_count() or 1), *own)
 
 
 def abandon(threads: Iterable[threading.Thread]) -> None:
-    """End the compilers that these threads wait for, and each that they will start: nobody waits for the threads."""
+    """End the compilers for which these threads wait, and each that they will start: their results are not needed."""
     _ABANDONED.update(threads)
     for life, thread in list(_RUNNING.items()):
         if thread in _ABANDONED:
@@ -130,7 +130,7 @@ def abandon(threads: Iterable[threading.Thread]) -> None:
 def _begun(
     command: Sequence[str], search: str, text: str, limit_s: float, memory: int
 ) -> Iterator[tuple[subprocess.Popen[str], Path, io.FileIO]]:
-    """Begin a compiler in a folder of its own; yield its process, the folder, and what lets it live."""
+    """Start a compiler in its own folder; yield its process, the folder, and the pipe whose closing ends it."""
     with contextlib.ExitStack() as ending:
         try:
             folder = ending.enter_context(tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True))
@@ -157,11 +157,11 @@ def _begun(
 
 
 def _clear_away(new: Path) -> None:
-    """Remove what was left next to a new folder, by processes killed before their compiler began or after it ended."""
+    """Remove remains next to a new folder, of processes killed before their compiler began or after it ended."""
     oldest = new.stat().st_mtime - STALE_S
     with contextlib.suppress(OSError), os.scandir(new.parent) as found:
         for entry in found:
-            with contextlib.suppress(OSError):  # another program may remove it just now
+            with contextlib.suppress(OSError):  # another program may remove it at the same time
                 if entry.name.startswith(FOLDER) and entry.is_dir(follow_symlinks=False):
                     known = entry.stat(follow_symlinks=False)
                     if known.st_uid == os.geteuid() and known.st_mtime < oldest:
@@ -169,19 +169,19 @@ def _clear_away(new: Path) -> None:
 
 
 def _awaited(process: subprocess.Popen[str], life: io.FileIO, name: str, limit_s: float) -> tuple[str, str]:
-    """Return what a compiler prints, and its complaints. With it end the processes that it has started."""
+    """Return a compiler's output and error output. The processes that it has started end with it."""
     thread = _RUNNING[life] = threading.current_thread()
     try:
         if thread in _ABANDONED:
             life.close()
         return _printed(process, limit_s)
     except BaseException as error:
-        if process.returncode is None:  # else its number may be another's by now
+        if process.returncode is None:  # else another process may have its number by now
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
         for pipe in (process.stdout, process.stderr):
             if pipe is not None:
-                pipe.close()  # what has left the compiler's session may hold its other end for as long as it likes
+                pipe.close()  # a process that has left the compiler's session may hold its other end for any time
         process.wait()
         if isinstance(error, subprocess.TimeoutExpired):
             raise NotNative(f"{name} has not ended within {limit_s:g} s") from error
@@ -191,7 +191,7 @@ def _awaited(process: subprocess.Popen[str], life: io.FileIO, name: str, limit_s
 
 
 def _printed(process: subprocess.Popen[str], limit_s: float) -> tuple[str, str]:
-    """Return what a process prints, and its complaints.
+    """Return the output and error output of a process.
 
     Raises:
         TimeoutExpired: it has not ended in time.
@@ -203,7 +203,7 @@ def _printed(process: subprocess.Popen[str], limit_s: float) -> tuple[str, str]:
 
 
 def _failure(name: str, code: int, complaints: str, memory: int) -> str:
-    """Return why there is no library."""
+    """Return the reason why there is no library."""
     lines = complaints.strip().splitlines() or [f"exit code {code}"]
     if any(words in complaints for words in _NO_MEMORY):
         return f"{name} has not enough memory for it, of which it may have {memory >> 20:,} MB: divide the task"

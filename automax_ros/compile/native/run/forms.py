@@ -1,4 +1,4 @@
-"""Which tasks of a run are made native: whether it is wanted, whether it pays, and what became of each task."""
+"""Decides which tasks of a run are made native: whether it is requested, whether it pays, and the outcome per task."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from automax_ros.compile.native.run.task import NativeTask
 
 LINE_NS = 75
-"""What a line of a task takes in a scan in Python, ns, about: a block does."""
+"""Approximate time of a task's line in a scan in Python, ns: that of a block."""
 WORTHWHILE_NS, WORTHWHILE_LINE_NS = 500_000_000, 10_000_000
 """Time that scans must take in Python for native ones to be built, ns, and what each line of the task adds to that
 (decision: twice what it takes to translate and build the task, which is 0.2 s, and 5 ms per line).
 """
 WORTHWHILE_KEPT_NS, WORTHWHILE_KEPT_LINE_NS = 150_000_000, 3_000_000
-"""The same for native scans to be looked for among what other runs have built (decision: it saves two thirds of this;
+"""The same for native scans to be looked up in the cache of other runs (decision: it saves two thirds of this;
 looking takes 0.05 to 0.1 s for the first task of a program, and 1 to 2 ms per line, for the scans are lowered first).
 """
 
@@ -38,7 +38,7 @@ _MOST_WHY = 400
 
 
 class NativeMode(enum.Enum):
-    """Whether tasks are made native: where it pays, wherever it can be, or never."""
+    """Whether tasks are made native: where it pays, wherever possible, or never."""
 
     AUTO = "auto"
     ON = "on"
@@ -55,20 +55,20 @@ class NativeOutcome:
 
     @property
     def text(self) -> str:
-        """What a person is told of it."""
+        """The outcome as text for the user."""
         return f"{self.compiled.program.name}: {'native' if self.native else f'in Python: {self.why}'}"
 
 
 @dataclass(frozen=True)
 class NativeForms:
-    """What a run wants of native scans.
+    """The settings of a run for native scans.
 
     Attributes:
         mode: whether tasks are made native.
-        expected_ns: task time that will pass, None without an end: with ``AUTO`` it says whether building pays.
-        cache: where they are kept.
-        limit_s: time in which each must be built, s.
-        why_off: what is told of each task with ``OFF``.
+        expected_ns: expected task time, None without an end: with ``AUTO`` it decides whether building pays.
+        cache: the cache for native scans.
+        limit_s: time limit for building each, s.
+        why_off: the reason given for each task with ``OFF``.
     """
 
     mode: NativeMode = NativeMode.OFF
@@ -78,17 +78,17 @@ class NativeForms:
     why_off: str = "native scans are off"
 
     def off(self, why: str) -> NativeForms:
-        """Return what a run wants in which no task is native, for a reason of its own."""
+        """Return the settings with native scans off, for a reason."""
         return self if self.mode is NativeMode.OFF else replace(self, mode=NativeMode.OFF, why_off=why)
 
     def made(self, tasks: Mapping[str, CompiledTask]) -> dict[str, NativeOutcome]:
-        """Return tasks as they are to run, by the same names; several are built at a time. Nothing is raised."""
+        """Return the form in which each task runs, by the same names; several are built at a time. Raises nothing."""
         if self.mode is NativeMode.OFF or not tasks:
             return {name: NativeOutcome(task, why=self.why_off) for name, task in tasks.items()}
         return _side_by_side(self.form, tasks)
 
     def library(self, text: str, worthwhile_ns: int) -> Path | None:
-        """Return the library of a C text that helps a run of at least this time; None where it is not to be had."""
+        """Return the library of a C text that pays for a run of at least this time; None where there is none."""
         too_short = self.expected_ns is not None and self.expected_ns < worthwhile_ns
         if self.mode is NativeMode.OFF or (self.mode is NativeMode.AUTO and too_short):
             return None
@@ -98,7 +98,7 @@ class NativeForms:
             return None
 
     def form(self, compiled: CompiledTask) -> NativeOutcome:
-        """Return a task as it is to run: as it is given where it is not native.
+        """Return the form in which a task runs: unchanged where it is not native.
 
         A fault of the translator itself costs the task its native form and nothing more, whatever the mode (decision).
         """
@@ -118,7 +118,7 @@ class NativeForms:
         return NativeOutcome(compiled.with_scans(native.scans, native.scans_forced), native)
 
     def _pays(self, compiled: CompiledTask, least_ns: int, least_line_ns: int) -> bool:
-        """Return whether scans in Python take as long as this, and as this for each line."""
+        """Return whether scans in Python take at least this time, and this additional time for each line."""
         if self.expected_ns is None:
             return True
         period = compiled.program.period_ns
@@ -129,7 +129,7 @@ class NativeForms:
 def _side_by_side(
     form: Callable[[CompiledTask], NativeOutcome], tasks: Mapping[str, CompiledTask]
 ) -> dict[str, NativeOutcome]:
-    """Return what becomes of each task. Ctrl-C waits for no thread, and no thread keeps the program from its end."""
+    """Return the outcome of each task. Ctrl-C waits for no thread, and no thread prevents the program from ending."""
     waiting = list(reversed(list(tasks.items())))
     found: queue.SimpleQueue[tuple[str, NativeOutcome | BaseException]] = queue.SimpleQueue()
 
@@ -155,7 +155,7 @@ def _side_by_side(
             if isinstance(outcome, BaseException):
                 raise outcome
             made[name] = outcome
-    except BaseException:  # Ctrl-C, say: the compilers would go on for as long as they take
+    except BaseException:  # such as Ctrl-C: the compilers would continue to their end
         waiting.clear()
         abandon(threads)
         raise

@@ -1,4 +1,4 @@
-"""A task's state as the slots of C (``abi.h``): which kind each field has, and the way there and back."""
+"""Converts a task's state to the slots of C (``abi.h``) and back, with the kind of each field."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from automax_ros.compile.base.layout import Layout, StateField, StateValue
 from automax_ros.core.types import DataType, Value
 
 BOOLEAN, INTEGER, REAL = range(3)
-"""The kinds of values, as ``abi.h`` numbers them."""
+"""The kinds of values, numbered as in ``abi.h``."""
 Slots = npt.NDArray[np.int64]
 """64 bits each; those of a double where the kind is REAL."""
 _KINDS = {DataType.BOOLEAN: BOOLEAN, DataType.INTEGER: INTEGER, DataType.DOUBLE: INTEGER, DataType.REAL: REAL}
@@ -19,7 +19,7 @@ _INT64 = (-(1 << 63), (1 << 63) - 1)
 
 
 class Misfit(Exception):
-    """A state holds what C is not made for; it scans in Python."""
+    """A state has a value that the C code does not support; it scans in Python."""
 
 
 def kind_of(type_: DataType) -> int:
@@ -28,17 +28,17 @@ def kind_of(type_: DataType) -> int:
 
 
 class StateSlots:
-    """The slots of one layout. ``limits`` are the least and greatest integers of each field, () if any 64 bits are."""
+    """The slots of one layout. ``limits`` are the least and greatest integers of each field, () for any 64 bits."""
 
     def __init__(self, layout: Layout, limits: Sequence[tuple[int, int]] = ()) -> None:
-        """Take the layout."""
+        """Create the slots of a layout."""
         self._fields = layout.fields
         self._limits = tuple(limits) or (_INT64,) * len(layout.fields)
         self._size = sum(field.size for field in layout.fields)
         python = {BOOLEAN: bool, INTEGER: int, REAL: float}
         kinds = [python[kind_of(field.type)] for field in layout.fields]
         self._fitting = [(kind, low, high) for kind, (low, high) in zip(kinds, self._limits, strict=True)]
-        """The type in Python that each field has, and the least and greatest integer."""
+        """The Python type of each field, and its least and greatest integer."""
         self._places = [
             (position, index) for position, field in enumerate(layout.fields) for index in range(field.size)
         ]
@@ -46,7 +46,7 @@ class StateSlots:
 
     @property
     def fields(self) -> tuple[tuple[int, int, bool, int, int], ...]:
-        """What the host must know of each field: kind, size, whether it is an array, least and greatest integer."""
+        """The data of each field for the host: kind, size, whether it is an array, least and greatest integer."""
         return tuple(
             (kind_of(field.type), field.size, field.is_array, low, high)
             for field, (low, high) in zip(self._fields, self._limits, strict=True)
@@ -72,7 +72,7 @@ class StateSlots:
         return slots
 
     def put(self, slots: Slots, before: Slots, state: list[StateValue]) -> None:
-        """Put into a state, in place, what is no longer as it was ``before``."""
+        """Write the slots that differ from ``before`` into a state, in place."""
         for place in np.flatnonzero(slots != before).tolist():
             position, index = self._places[place]
             value = _object(self._fields[position], slots[place])

@@ -1,10 +1,9 @@
-"""The native form of a compiled task: built or found in the cache, loaded, and called as the Python forms are.
+"""The native form of a compiled task: built or found in the cache, loaded, and called like the Python forms.
 
-Translations of tasks, kept in the cache: a long task's takes some seconds.
-
-What is kept is found by the SHA-256 of all that a translation depends on: the lowered scans with the lines of their
-statements, what they call, the types of what they name, and every source of this installation. A text comes back only
-from a file that nobody else can write, and that is whole (``NativeCache``), as a library does.
+Translations are cached too, since that of a long task takes some seconds. Their key is the SHA-256 of all that a
+translation depends on: the lowered scans with the lines of their statements, their callees, the types of their names,
+and every source of this installation. Like a library, a text is read only from a complete file that other users cannot
+write (``NativeCache``).
 """
 
 from __future__ import annotations
@@ -36,14 +35,14 @@ from automax_ros.compile.native.translate.translation import fixed_parts, scans_
 from automax_ros.parallel.installation import installation
 
 _TRANSLATOR = (installation().sources, sys.implementation.cache_tag, *fixed_parts())
-"""What translates: looked at when this module is loaded, as are the others, so that it is what runs."""
+"""The translator's sources: read when this module is loaded, like the other modules, so that they match what runs."""
 
 
 def kept_translation(compiled: CompiledTask, cache: NativeCache, *, builds: bool = True) -> NativeSource:
-    """Return the C of a task's scans, as ``translate`` does: from the cache, or translated if it ``builds``, and kept.
+    """Return the C of a task's scans, as ``translate`` does: from the cache, or, if ``builds``, translated and cached.
 
     Raises:
-        NotNative: the task has no translation, or only a new one, or the cache is not safe.
+        NotNative: the task has no translation, or none in the cache and not ``builds``, or the cache is not safe.
     """
     form = scans_of(compiled)
     key = translation_key(compiled, form)
@@ -76,7 +75,7 @@ def translation_key(compiled: CompiledTask, form: Form) -> str:
 
 
 def _described(item: object) -> str:
-    """Return what generated code knows by a name: a function is one of the sources, by its own name."""
+    """Return a description of a global of generated code; a function is described by its own name in the sources."""
     if isinstance(item, CoefficientFunction):
         return repr((item.block.name, item.period_s, sorted(item.literals.items()), item.evaluated))
     name = getattr(item, "__qualname__", None)
@@ -94,11 +93,11 @@ def _unpacked(content: bytes) -> NativeSource:
 
 _HOST = "automax_host"
 _HOST_TEXTS = ("abi.h", "host/values.c", "host/touch.c", "host/state.c", "host/scans.c", "host/library.c")
-"""The files that make the host, in their order."""
+"""The files that make up the host, in their order."""
 
 
 class NativeTask:
-    """A task whose scans are machine code. ``scans`` and ``scans_forced`` are called as those of ``CompiledTask``."""
+    """A task whose scans are machine code; ``scans`` and ``scans_forced`` are called like those of ``CompiledTask``."""
 
     def __init__(self, compiled: CompiledTask, source: NativeSource, path: Path, host: Any) -> None:
         """Load a task's library with the module that calls it.
@@ -137,10 +136,10 @@ def native_form(
     *,
     builds: bool = True,
 ) -> NativeTask:
-    """Return the native form of a task, from the cache or, if it ``builds``, made now. Any thread may ask for it.
+    """Return the native form of a task, from the cache or, if ``builds``, built now. Any thread may call this.
 
     Raises:
-        NotNative: the task cannot be native, or not here, and why.
+        NotNative: the task cannot be native, or not on this machine, with the reason.
     """
     try:
         require_tools(limit_s)  # first, since translating a long task takes some seconds
@@ -152,7 +151,7 @@ def native_form(
 
 
 def _forced_in_python(compiled: CompiledTask) -> Scans:
-    """Return the Python form that heeds forces, compiled when it is needed."""
+    """Return the Python form that applies forces, compiled on demand."""
 
     def scans(state: StateValues, io: ScanIo) -> Generator[bool, None, None]:
         return compiled.scans_forced(state, io)
@@ -164,7 +163,7 @@ def host_module(cache: NativeCache, limit_s: float = LIMIT_S, *, builds: bool = 
     """Return the module that calls native tasks, from the cache or built now.
 
     Raises:
-        NotNative: it cannot be built here, or is not to be.
+        NotNative: it cannot be built here, or not ``builds``.
         OSError, ImportError: it cannot be loaded.
     """
     folder = Path(__file__).parent.parent
@@ -174,7 +173,7 @@ def host_module(cache: NativeCache, limit_s: float = LIMIT_S, *, builds: bool = 
 
 @lru_cache(maxsize=4)
 def _host(path: str) -> Any:
-    """Return the module that calls native tasks; it does not stand among the modules that can be imported."""
+    """Return the module that calls native tasks; it is not put into ``sys.modules``."""
     loader = ExtensionFileLoader(_HOST, path)
     spec = spec_from_loader(_HOST, loader)
     assert spec is not None

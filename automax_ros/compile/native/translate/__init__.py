@@ -1,1 +1,1 @@
-"""Python functions of a task to C, with the range of each value known."""
+"""Translates Python functions of a task to C, with the range of each value known."""

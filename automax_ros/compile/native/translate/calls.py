@@ -1,7 +1,7 @@
-"""Calls of what generated code may call: helpers of the blocks, functions of BASIC, those of Python itself.
+"""Translation of calls in generated code: of helpers of the blocks, functions of BASIC, and Python's own functions.
 
-Most are translated from their own Python, once for each range of arguments that makes another text; the few that
-Python does with integers of any size or with bytes are written in ``operations.h``, and tested against their Python.
+Most functions are translated from their Python, once for each range of arguments that gives a different text; the few
+that use integers of any size or bytes in Python are written in ``operations.h``, and tested against their Python.
 """
 
 from __future__ import annotations
@@ -87,12 +87,12 @@ def _parsed(function: FunctionType) -> ast.FunctionDef:
         raise NotNative(f"a call of {function.__name__}")
     for node in ast.walk(parsed):
         if isinstance(node, ast.stmt):
-            node.lineno = 0  # the lines of a task are meant where something cannot be translated
+            node.lineno = 0  # lines in messages are those of the task
     return parsed
 
 
 def _of_annotation(item: Typed, parameter: ast.arg) -> Typed:
-    """Return an argument as the parameter's annotation has it: an integer for a float is the same number."""
+    """Return an argument converted to the parameter's annotation: an integer for a float is the same number."""
     annotation = parameter.annotation
     wanted = annotation.id if isinstance(annotation, ast.Name) else ""
     if wanted == "float":
@@ -101,7 +101,7 @@ def _of_annotation(item: Typed, parameter: ast.arg) -> Typed:
 
 
 def _general(known: Range) -> Range:
-    """Return a range that many calls share, so that they share the function in C."""
+    """Return a wider range that many calls share, so that they share the function in C."""
     if known.kind is Kind.BOOL:
         return ANY_BOOL
     if known.kind is Kind.REAL:
@@ -115,7 +115,11 @@ def _general(known: Range) -> Range:
 
 
 def _frame_of(frame: Frame, parsed: ast.FunctionDef, scope: Mapping[str, object], ranges: list[Range]) -> Frame:
-    """Return a function translated for arguments of some ranges; those that it cannot be are those of the call."""
+    """Return a function translated for arguments of some ranges.
+
+    Raises:
+        NotNative: it cannot be translated for them.
+    """
     made = Frame(frame.unit, scope, called)
     known = Environment(dict(zip((argument.arg for argument in parsed.args.args), ranges, strict=True)))
     for name, item in known.items():
@@ -146,7 +150,7 @@ def _defined(made: Frame, name: str, parameters: list[str], ranges: list[Range])
 
 
 def _delivered(frame: Frame, name: str, texts: list[str], results: list[Range], *, can_end: bool) -> list[Typed]:
-    """Return a call whose second and further results come through pointers."""
+    """Return a call whose second and further results are returned by pointers."""
     others = [Typed(frame.temporary(item), item) for item in results[1:]]
     arguments = [*texts, *(f"&{item.text}" for item in others)]
     if can_end:
@@ -154,7 +158,7 @@ def _delivered(frame: Frame, name: str, texts: list[str], results: list[Range], 
     return [Typed(f"{name}({', '.join(arguments)})", results[0]), *others]
 
 
-# Python's own
+# Python's own functions
 
 
 def _absolute(_: Frame, arguments: list[Typed]) -> list[Typed]:
@@ -192,7 +196,7 @@ def _least_or_most(*, least: bool) -> Carry:
 
 
 def _of_library(name: str, low: float = -INFINITE, high: float = INFINITE, result: Range = ANY_REAL) -> Carry:
-    """Return what calls a function of the C library where Python raises nothing: for arguments within bounds."""
+    """Return the translation to a function of the C library, for arguments within bounds where Python never raises."""
 
     def library(frame: Frame, arguments: list[Typed]) -> list[Typed]:
         item = as_real(arguments[0])
@@ -218,13 +222,13 @@ def _stored_real(frame: Frame, arguments: list[Typed]) -> list[Typed]:
         stored_real(bound)[0] if abs(bound) != INFINITE else math.copysign(REAL_MAX, bound)
         for bound in (item.range.low, item.range.high)
     ]
-    # not a number becomes 0
+    # NaN becomes 0
     result = Range(Kind.REAL, min(0.0, stored[0]), max(0.0, stored[1]), never_nan=True)
     return _delivered(frame, "stored_real", [bare(item.text)], [result, ANY_BOOL], can_end=False)
 
 
 def _data_value(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
-    """Return READ of a DATA value: what each would give in a variable of the type is known."""
+    """Return READ of a DATA value: the result of each value for a variable of the type is known."""
     item, suffix, limit = node.args
     data = frame.scope["data"]
     if not (isinstance(item, ast.Subscript) and isinstance(suffix, ast.Constant) and isinstance(data, tuple)):
@@ -274,4 +278,4 @@ _BUILTINS: dict[object, Carry] = {
     functions.real_power: _real_power,
     raised: _raised,
 }
-"""How each function is carried out that is not translated from its Python."""
+"""The translation of each function that is not translated from its Python."""

@@ -1,7 +1,4 @@
-"""What is known of each name that has a value, at one place of a function.
-
-What the translation of expressions asks of the function that they stand in.
-"""
+"""The known range of each name that has a value, at one place of a function, and the interface to that function."""
 
 from __future__ import annotations
 
@@ -13,29 +10,29 @@ from automax_ros.compile.native.translate.ranges import Range
 from automax_ros.compile.native.translate.typed import Typed
 
 _MOST_CHANGES = 128
-"""Changes after which a base of its own is made: a copy costs as many, a base costs all the names of a task."""
+"""Changes after which a new base is made: a copy costs all changes, a base costs all names of a task."""
 
 
 class Environment:
-    """Ranges by name. A copy shares what it does not change: a branch sets few names of the whole task.
+    """Ranges by name. A copy shares unchanged ranges: a branch sets few names of the whole task.
 
-    Whoever sets a name must have made the environment, by ``copy`` or as a new one.
+    Names may be set only in an environment that the caller has created, new or by ``copy``.
     """
 
     __slots__ = ("_base", "_changes")
 
     def __init__(self, base: Mapping[str, Range], changes: dict[str, Range | None] | None = None) -> None:
-        """Take what is known, which is not changed any more, and what is otherwise: None for a name without value."""
+        """Create it from known ranges, which must not change any more, and changes: None for a name without value."""
         self._base = base
         self._changes: dict[str, Range | None] = {} if changes is None else changes
 
     def get(self, name: str) -> Range | None:
-        """Return what is known of a name, None where it has no value."""
+        """Return the range of a name, None where it has no value."""
         changes = self._changes
         return changes[name] if name in changes else self._base.get(name)
 
     def __getitem__(self, name: str) -> Range:
-        """Return what is known of a name that has a value."""
+        """Return the range of a name that has a value."""
         found = self.get(name)
         if found is None:
             raise KeyError(name)
@@ -48,19 +45,19 @@ class Environment:
         return self.get(name) is not None
 
     def copy(self) -> Environment:
-        """Return another one that can be changed."""
+        """Return a copy that can be changed."""
         if len(self._changes) > _MOST_CHANGES:
             return Environment(dict(self.items()))
         return Environment(self._base, self._changes.copy())
 
     def setting(self, name: str, known: Range) -> Environment:
-        """Return another one in which one name has this range."""
+        """Return a copy in which one name has this range."""
         made = self.copy()
         made[name] = known
         return made
 
     def without(self, names: set[str]) -> Environment:
-        """Return another one in which some names have no value."""
+        """Return a copy in which some names have no value."""
         made = self.copy()
         changes = made._changes
         for name in names:
@@ -71,7 +68,7 @@ class Environment:
         return made
 
     def items(self) -> Iterator[tuple[str, Range]]:
-        """Yield each name that has a value, with what is known of it."""
+        """Yield each name that has a value, with its range."""
         changes = self._changes
         for name, known in self._base.items():
             if name not in changes:
@@ -81,7 +78,7 @@ class Environment:
                 yield name, changed
 
     def differing(self, other: Environment) -> Iterator[tuple[str, Range | None, Range | None]]:
-        """Yield each name of which the two know different things, and what; None where it has no value."""
+        """Yield each name whose range differs between the two, and both ranges; None where it has no value."""
         if self._base is not other._base:
             yield from self._differing_throughout(other)
             return
@@ -104,7 +101,7 @@ class Environment:
                 yield name, None, there
 
     def joined(self, other: Environment) -> Environment:
-        """Return what is known where two paths meet: a name that has no value on one of them has none."""
+        """Return the known ranges where two paths meet: a name that has no value on one of them has none."""
         changes = self._changes.copy()
         for name, here, there in self.differing(other):
             changes[name] = None if here is None or there is None else here.joined(there)
@@ -112,7 +109,7 @@ class Environment:
 
 
 def joined(first: Environment | None, second: Environment | None) -> Environment | None:
-    """Return what is known where two paths meet; None: no path."""
+    """Return the known ranges where two paths meet; None: no path."""
     if first is None or second is None:
         return second if first is None else first
     return first.joined(second)
@@ -126,7 +123,7 @@ class Context(Protocol):
         ...
 
     def refined(self, test: ast.expr, known: Environment, *, truth: bool) -> Environment | None:
-        """Return what is known where a test came out as ``truth``; None where it cannot."""
+        """Return the known ranges where a test has the result ``truth``; None where it cannot."""
         ...
 
     def read(self, name: str, known: Environment) -> Typed:
@@ -150,5 +147,5 @@ class Context(Protocol):
         ...
 
     def ended(self) -> str:
-        """Return the argument by which a function says that the scan ends here; the statement then asks for it."""
+        """Return the argument by which a function reports that the scan ends here; the statement then checks it."""
         ...

@@ -43,7 +43,7 @@ def value(frame: Context, node: ast.expr, known: Environment) -> Typed:
     """Return an expression in C.
 
     Raises:
-        NotNative: C cannot give what Python gives.
+        NotNative: C cannot give the same value as Python.
     """
     carry_out = _EXPRESSIONS.get(type(node))
     if carry_out is None:
@@ -54,7 +54,7 @@ def value(frame: Context, node: ast.expr, known: Environment) -> Typed:
 
 
 def condition(frame: Context, node: ast.expr, known: Environment) -> str:
-    """Return an expression as C tests it: Python's truth of a number is that of C."""
+    """Return an expression as a condition of C: Python's truth of a number is that of C."""
     return value(frame, node, known).text
 
 
@@ -93,7 +93,7 @@ def _whole_result(text: str, result: Range, *operands: Typed) -> Typed:
 
 
 def _wide_or_signed(left: Typed, result: Range, *others: Typed) -> str:
-    """Return the left operand in the bits that an operation is carried out in."""
+    """Return the left operand in as many bits as the operation uses."""
     if result.is_wide or any(item.range.is_wide for item in (left, *others)):
         return widened(left)
     return left.signed
@@ -162,7 +162,7 @@ def _quotient(frame: Context, left: Typed, right: Typed) -> Typed:
 
 
 def _not_zero(frame: Context, right: Typed) -> Typed:
-    """Return a divisor that is surely other than 0: where that cannot be shown, the scan ends if it is 0."""
+    """Return a divisor that is not 0: where that cannot be proved, the scan ends if it is 0."""
     low, high = right.range.low, right.range.high
     if not low <= 0 <= high:
         return right
@@ -236,14 +236,14 @@ def _relation(left: Typed, sign: str, right: Typed) -> str:
 
 
 def _compares(whole: Range, real: Range) -> bool:
-    """Return whether an integer compares with a REAL as the double next to it does."""
+    """Return whether an integer compares with a REAL in the same way as the nearest double does."""
     if whole.is_exact:
         return real.is_exact
     return real.kind is Kind.REAL and real.low > -EXACT_IN_DOUBLE and real.high < EXACT_IN_DOUBLE
 
 
 def _bool_op(frame: Context, node: ast.BoolOp, known: Environment) -> Typed:
-    """Return ``and``, ``or``: of booleans a boolean, of integers the operand that decides."""
+    """Return ``and`` or ``or``: of booleans a boolean, of integers the operand that decides."""
     both = isinstance(node.op, ast.And)
     operands: list[Typed] = []
     for item in node.values:
@@ -271,7 +271,7 @@ def _if_exp(frame: Context, node: ast.IfExp, known: Environment) -> Typed:
 
 
 def _branch(item: Typed) -> str:
-    """Return one of the values that C chooses from: an integer in 64 bits."""
+    """Return one of the values between which C chooses: an integer in 64 bits."""
     return item.signed if item.range.kind is Kind.INT else item.text
 
 
@@ -297,7 +297,7 @@ def _attribute(frame: Context, node: ast.Attribute, _: Environment) -> Typed:
 
 
 def extreme(arguments: Sequence[Typed], *, least: bool) -> Typed:
-    """Return Python's ``min`` or ``max``: of equal ones the first, and the first where the other is not a number."""
+    """Return Python's ``min`` or ``max``: of equal ones the first, and the first where the other is NaN."""
     result = arguments[0]
     for item in arguments[1:]:
         kinds = {result.range.kind, item.range.kind}
@@ -314,7 +314,7 @@ def extreme(arguments: Sequence[Typed], *, least: bool) -> Typed:
 
 
 def _extreme_range(kind: Kind, first: Range, second: Range, *, least: bool) -> Range:
-    """Return the range of the lesser or greater of two: of the first, where the second is not a number."""
+    """Return the range of the lesser or greater of two; it includes the first where the second may be NaN."""
     choose = min if least else max
     low, high = choose(first.low, second.low), choose(first.high, second.high)
     if not second.is_number:

@@ -1,7 +1,4 @@
-"""One function under translation: its names, its lines, its calls.
-
-The C text of one task in the making: its tables and its functions.
-"""
+"""A function under translation, with its names, lines and calls, and the C text of its task: tables and functions."""
 
 from __future__ import annotations
 
@@ -32,14 +29,14 @@ class Unit:
     def tree(
         self, function: CoefficientFunction, make: Callable[[CoefficientFunction], ast.FunctionDef]
     ) -> ast.FunctionDef:
-        """Return the tree of a block's coefficients, made once: the task is looked through several times."""
+        """Return the tree of a block's coefficients, made once: the task is translated several times."""
         key = id(function)
         if key not in self._trees:
             self._trees[key] = make(function)
         return self._trees[key]
 
     def table(self, items: Sequence[Typed], place: str, known: Range) -> Typed:
-        """Return an element of a table of constants, of an index that lies inside."""
+        """Return an element of a table of constants, at an index that is inside."""
         body = f"[] = {{{', '.join(item.text for item in items)}}};"
         key = f"static const {c_type(known)} {body}"
         name = self._tables.get(key)
@@ -49,7 +46,7 @@ class Unit:
         return Typed(f"{name}[{place}]", known)
 
     def function(self, name: str, head: str, body: str) -> str:
-        """Return the name in C of a function; ``head`` and ``body`` have ``@`` in the place of the name."""
+        """Return the name in C of a function; ``head`` and ``body`` have ``@`` in place of the name."""
         key = head + body
         if key not in self._functions:
             free, number = name, 1
@@ -64,15 +61,15 @@ class Unit:
 
 @dataclass(frozen=True)
 class Array:
-    """A buffer of the state: its place in C, and the number of its elements. Their range is that of its name."""
+    """A buffer of the state: its place in C and the number of its elements. Their range is that of its name."""
 
     place: str
     size: int
 
 
 _PINNED_FROM, _PINNED = 2**33, 2**40
-"""A block's integer whose range goes on growing past the first is taken to stay within the second (decision): no block
-of the manual keeps more than 32 bits. The code checks it, and ends the scan with an error where it does not hold."""
+"""A block's integer whose range keeps growing past the first is assumed to stay within the second (decision): no block
+of the manual keeps more than 32 bits. The code checks it, and ends the scan with an error where it is not true."""
 Member = Callable[["Frame", ast.Call, Environment], list[Typed]]
 """Translates a call of ``io``."""
 
@@ -82,11 +79,11 @@ Caller = Callable[["Frame", object, ast.Call, Environment], list[Typed]]
 
 @dataclass
 class Frame:
-    """A function in the making.
+    """A function under translation.
 
     ``fields`` are the places in C of scalar fields of the state, ``arrays`` its buffers, ``tuples`` named constants;
-    ``declared`` is what names can hold at the end of a BASIC line, ``touched`` are those set since the last one began;
-    ``scope`` are the globals of a Python function, ``members`` what calls of ``io`` become.
+    ``declared`` are the ranges of names at the end of a BASIC line, ``touched`` the names set since the last line
+    began; ``scope`` are the globals of a Python function, ``members`` the translations of calls of ``io``.
     """
 
     unit: Unit
@@ -125,7 +122,7 @@ class Frame:
         self.depth -= 1
 
     def unite_else(self, begin: int) -> None:
-        """Write an ELSE that holds nothing but an IF, from a line to the end, as ``else if``."""
+        """Write an ELSE that contains only an IF, from a line to the end, as ``else if``."""
         margin = "    " * (self.depth + 1)
         inner = self.lines[begin + 1 : -1]
         alone = inner and inner[0].startswith(f"{margin}if (")
@@ -133,7 +130,7 @@ class Frame:
             self.lines[begin:] = [f"{'    ' * self.depth}}} else {inner[0].strip()}", *(line[4:] for line in inner[1:])]
 
     def begin_again(self) -> None:
-        """Forget the lines: the function is translated once more, with what is now known of its names."""
+        """Discard the lines: the function is translated once more, with the ranges now known."""
         self.lines.clear()
         self.returned.clear()
         self.has_grown = False
@@ -142,7 +139,7 @@ class Frame:
 
     @property
     def extent(self) -> tuple[int, int]:
-        """What grows while a function is translated, and lets statements come out otherwise than before."""
+        """Numbers that grow while a function is translated; with them the translation of statements changes."""
         return len(self._wide), len(self.wide_fields)
 
     # Names
@@ -168,7 +165,7 @@ class Frame:
         return place
 
     def _place_of_field(self, name: str, known: Range) -> str:
-        """Return where a field lies: in a local until the scan is left, where it is beyond 64 bits meanwhile."""
+        """Return the place of a field: a local until the end of the scan, if it may exceed 64 bits meanwhile."""
         if known.kind is not self.field_kinds[name]:
             raise NotNative(f"{name} would hold a value of another kind than its own")
         if known.is_wide and name not in self.wide_fields:
@@ -179,7 +176,7 @@ class Frame:
         return self.wide_fields.get(name, self.fields[name])
 
     def parameter(self, name: str, known: Range) -> None:
-        """Take a parameter of the function."""
+        """Declare a parameter of the function."""
         self._place(name, known)
 
     def temporary(self, known: Range) -> str:
@@ -220,7 +217,7 @@ class Frame:
         return Typed(f"{array.place}[{bare(self.place_in(array.size, index, known))}]", known[name])
 
     def pinned(self, name: str, known: Range) -> Range:
-        """Return what a field may hold whose range goes on growing: a block's integer ends somewhere."""
+        """Return the assumed range of a field whose range keeps growing: a block's integer has bounds."""
         if name not in self.fields and name not in self.arrays:
             return known
         if known.kind is Kind.INT and max(-known.low, known.high) > _PINNED_FROM:
@@ -228,9 +225,9 @@ class Frame:
         return known
 
     def place_in(self, size: int, index: ast.expr, known: Environment) -> str:
-        """Return an index that lies inside: unless it is a literal the scan asks, whatever was shown of it (decision).
+        """Return an index inside an array: unless it is a literal the scan checks it, whatever was proved (decision).
 
-        No fault of a proof, and no value that comes from outside, then reaches memory outside the array.
+        So neither a fault of a proof nor a value from outside can reach memory outside the array.
         """
         place, inside = self.value(index, known).whole, Range(Kind.INT, 0, size - 1)
         if isinstance(index, ast.Constant):
@@ -238,7 +235,7 @@ class Frame:
         return self._asked_to_lie_in(place, inside).text
 
     def held(self, item: Typed, declared: Range | None) -> Typed:
-        """Return a value that is surely within a range: where that cannot be shown, the scan ends if it is not."""
+        """Return a value that is within a range: where that cannot be proved, the scan ends if it is not."""
         if declared is None or declared.holds(item.range):
             return item
         return self._asked_to_lie_in(item, declared)
@@ -266,7 +263,7 @@ class Frame:
         return expressions.value(self, node, known)
 
     def refined(self, test: ast.expr, known: Environment, *, truth: bool) -> Environment | None:
-        """Return what is known where a test came out as ``truth``; None where it cannot."""
+        """Return the known ranges where a test has the result ``truth``; None where it cannot."""
         return refinement.refined(self, test, known, truth=truth)
 
     def call(self, node: ast.Call, known: Environment) -> list[Typed]:
@@ -284,6 +281,6 @@ class Frame:
         raise NotNative("a call of what is not known")
 
     def ended(self) -> str:
-        """Return the argument by which a function says that the scan ends here; the statement then asks for it."""
+        """Return the argument by which a function reports that the scan ends here; the statement then checks it."""
         self.asks_end = self.can_end = True
         return "ended"

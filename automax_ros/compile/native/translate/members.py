@@ -1,4 +1,4 @@
-"""What the calls of ``io`` become: functions of the host that the scan is given."""
+"""Translation of the calls of ``io`` to functions of the host, which is passed to the scan."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WRITES = {Kind.BOOL: "write_whole", Kind.INT: "write_whole", Kind.REAL: "write_
 
 
 def members(types: Mapping[int, DataType]) -> dict[str, Member]:
-    """Return what each call becomes; ``types`` are those of the commons, by view."""
+    """Return the translation of each call; ``types`` are those of the commons, by view."""
 
     def read_now(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
         view, kind = _common(types, node)
@@ -59,7 +59,7 @@ def _common(types: Mapping[int, DataType], node: ast.Call) -> tuple[int, DataTyp
 
 
 def _bounds(kind: DataType) -> tuple[str, str]:
-    """Return the arguments for the bounds of what is read: a recording may hold anything."""
+    """Return the arguments for the bounds of a value that is read: a recording may contain any value."""
     if kind not in (DataType.INTEGER, DataType.DOUBLE):
         return "", ""
     low, high = of_type(kind).low, of_type(kind).high

@@ -1,7 +1,7 @@
-"""What is known of a value at a place of a task: its kind, and the least and the most it can be.
+"""The range of a value at a place of a task: its kind, and its least and greatest value.
 
-A REAL's bounds leave out what is not a number: whatever makes an integer of a REAL asks for that when it runs. Where a
-comparison tells something of another value, it matters: one with what is not a number fails whatever that value is.
+A REAL's bounds do not include NaN: a conversion of a REAL to an integer checks for it at run time. It matters where a
+comparison narrows the range of another value: one with NaN fails whatever that value is.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from automax_ros.core.types import DataType
 
 
 class Kind(enum.Enum):
-    """What Python holds a value as; ``c_type`` is the type in C."""
+    """The Python type of a value; ``c_type`` is the type in C."""
 
     BOOL = "bool"
     INT = "int64_t"
     REAL = "double"
 
     def __init__(self, c_type: str) -> None:
-        """Take the type in C."""
+        """Set the type in C."""
         self.c_type = c_type
 
 
 _BOOL, _INT, _REAL = Kind
-"""Names of their own: an enumeration's member is slow to get, and a long task asks some million times."""
+"""Module names: an enumeration's member is slow to read, and a long task reads them some million times."""
 INT64_MAX = 2**63 - 1
 EXACT_IN_DOUBLE = 2**53
-"""Every whole number up to this is a double; beyond, C and Python compare an integer with a double differently."""
+"""Every whole number up to this is a double; beyond it, C and Python compare an integer with a double differently."""
 INFINITE = math.inf
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """A kind, and bounds that the value keeps; of one that differs from path to path ``kind`` is None.
+    """The kind of a value, and its bounds; ``kind`` is None where it differs from path to path.
 
-    ``never_nan`` says of a REAL that it is surely a number.
+    ``never_nan`` says that a REAL cannot be NaN.
     """
 
     kind: Kind | None
@@ -49,12 +49,12 @@ class Range:
 
     @property
     def is_whole(self) -> bool:
-        """Whether Python computes with it as with an integer."""
+        """Whether Python computes with it as an integer."""
         return self.kind is _INT or self.kind is _BOOL
 
     @property
     def is_number(self) -> bool:
-        """Whether it is surely a number: what is not fails every comparison."""
+        """Whether it cannot be NaN, which fails every comparison."""
         return self.is_whole or self.never_nan
 
     @property
@@ -69,23 +69,23 @@ class Range:
 
     @property
     def only(self) -> float | None:
-        """The one integer or boolean that it can be, None where there are several."""
+        """The only integer or boolean that it can be, None where there are several."""
         return self.low if self.is_whole and self.low == self.high else None
 
     def holds(self, other: Range) -> bool:
-        """Return whether another range lies within this one."""
+        """Return whether another range is within this one."""
         may_be_nan = other.never_nan or not self.never_nan
         return self.kind is other.kind and self.low <= other.low and other.high <= self.high and may_be_nan
 
     def joined(self, other: Range) -> Range:
-        """Return what a value is that comes from one of two paths."""
+        """Return the range of a value that comes from one of two paths."""
         if self == other:
             return self
         kind = self.kind if self.kind is other.kind else None
         return Range(kind, min(self.low, other.low), max(self.high, other.high), self.never_nan and other.never_nan)
 
     def widened(self, new: Range) -> Range:
-        """Return a range that holds both, with bounds that move in few steps only, so that loops come to an end."""
+        """Return a range that contains both, with bounds that move in few steps only, so that loops converge."""
         both = self.joined(new)
         if both == self or both.kind is None or both.kind is Kind.BOOL:
             return both
@@ -106,7 +106,7 @@ _REAL_STEPS: tuple[float, ...] = (
 
 
 def _reaching(steps: tuple[float, ...], bound: float) -> float:
-    """Return the least step, or step with its sign turned, that is not below an upper bound."""
+    """Return the least step, or negated step, that is not below an upper bound."""
     if bound >= 0:
         return next(step for step in steps if step >= bound)
     return -next(step for step in reversed(steps) if step <= -bound)
@@ -129,7 +129,7 @@ def of_type(kind: DataType) -> Range:
 
 
 def corners(left: Range, right: Range, operation: Callable[[float, float], float], *, real: bool) -> Range:
-    """Return the range of an operation that grows or falls with each of its operands."""
+    """Return the range of an operation that is monotonic in each of its operands."""
     pairs = [(a, b) for a in (left.low, left.high) for b in (right.low, right.high)]
     kind = Kind.REAL if real else Kind.INT
     try:
@@ -144,7 +144,7 @@ def corners(left: Range, right: Range, operation: Callable[[float, float], float
 
 
 def span(ranges: Iterable[Range]) -> Range:
-    """Return what holds several ranges."""
+    """Return the range that contains several ranges."""
     found: Range | None = None
     for item in ranges:
         found = item if found is None else found.joined(item)

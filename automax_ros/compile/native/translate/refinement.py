@@ -1,4 +1,4 @@
-"""What a test that held, or did not, tells of the values that it compares."""
+"""Narrows the ranges of values by the result of a test that compares them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MIRRORED: dict[type[ast.cmpop], type[ast.cmpop]] = {
 
 
 def refined(frame: Context, test: ast.expr, known: Environment, *, truth: bool) -> Environment | None:
-    """Return what is known where a test came out as ``truth``; None where it cannot."""
+    """Return the known ranges where a test has the result ``truth``; None where it cannot."""
     if isinstance(test, ast.Constant):
         return known if bool(test.value) is truth else None
     if isinstance(test, ast.Name):
@@ -54,7 +54,7 @@ def _truth_of(name: str, known: Environment, *, truth: bool) -> Environment | No
 
 
 def _all_of(frame: Context, test: ast.BoolOp, known: Environment) -> Environment | None:
-    """Return what is known where all operands came out alike: of AND true, of OR false."""
+    """Return the known ranges where all operands have the same result: of AND true, of OR false."""
     truth = isinstance(test.op, ast.And)
     for operand in test.values:
         after = refined(frame, operand, known, truth=truth)
@@ -65,7 +65,7 @@ def _all_of(frame: Context, test: ast.BoolOp, known: Environment) -> Environment
 
 
 def _one_of(frame: Context, test: ast.BoolOp, known: Environment) -> Environment | None:
-    """Return what is known where one operand decided: of AND a false one, of OR a true one."""
+    """Return the known ranges where one operand decided: of AND a false one, of OR a true one."""
     decides = isinstance(test.op, ast.Or)
     found: Environment | None = None
     before: Environment | None = known
@@ -96,10 +96,10 @@ def _compared(frame: Context, test: ast.Compare, known: Environment, *, truth: b
 def _bounded(
     frame: Context, subject: ast.expr, relation: type[ast.cmpop], other: ast.expr, known: Environment, *, truth: bool
 ) -> Environment | None:
-    """Return what ``subject relation other`` tells of the subject, where that is a name or a name with its sign turned.
+    """Return the known ranges where ``subject relation other`` is true; the subject may be a name or a negated name.
 
-    ``truth`` is False where it was found because its opposite failed. What is not a number fails every comparison: so
-    of a REAL a range is never found to be empty, and where the other may be none its failing tells nothing.
+    ``truth`` is False where this is known because the opposite failed. NaN fails every comparison: so the range of a
+    REAL never counts as empty, and where the other may be NaN a failed comparison narrows nothing.
     """
     turned = isinstance(subject, ast.UnaryOp) and isinstance(subject.op, ast.USub)
     name = subject.operand if isinstance(subject, ast.UnaryOp) and turned else subject
@@ -119,7 +119,7 @@ def _bounded(
 
 
 def _limits(present: Range, relation: type[ast.cmpop], bound: Range) -> tuple[float, float]:
-    """Return the bounds of a value that stands in a relation to another."""
+    """Return the bounds of a value that has a relation to another."""
     low, high = present.low, present.high
     beyond = int(present.is_whole and bound.is_whole)
     if relation is ast.Eq:

@@ -1,9 +1,7 @@
-"""The statements that only a scan has: state, latch, forces, commit, the end of the scan.
+"""Translation of the statements that only a scan has: state, latch, forces, commit, the end of the scan.
 
-Statements of a scan that come out as they did before, when the scan is translated once more.
-
-A scan is translated until no state is left that was not thought of. From one time to the next little changes: most
-statements find their names as they found them before, and come to the same lines and the same ranges.
+A scan is translated repeatedly until the ranges of the state no longer grow. Little changes from one translation to the
+next: most statements find the same ranges as before and give the same lines and ranges, which are then reused.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ CarryOut = Callable[[ast.stmt, Environment], Environment | None]
 
 @dataclass(frozen=True)
 class _Came:
-    """What a statement found, and what came of it: lines, locals, names that it set, what is known after it."""
+    """What a statement depended on, and its result: lines, locals, names that it set, ranges that it changed."""
 
     found: tuple[object, ...]
     lines: list[str]
@@ -39,16 +37,16 @@ class _Came:
 
 
 class Repeated:
-    """The statements of one function that were translated; those with loops, and some that are named, never repeat."""
+    """The translated statements of one function, for reuse; those with loops, or with certain names, are not reused."""
 
     def __init__(self, frame: Frame, never: frozenset[str]) -> None:
-        """Take the function, and names whose statements depend on more than their own names."""
+        """Create it for a function; statements with the names ``never`` depend on more than their own names."""
         self._frame, self._never = frame, never
         self._names: dict[int, tuple[str, ...] | None] = {}
         self._came: dict[int, _Came] = {}
 
     def carried_out(self, statement: ast.stmt, known: Environment, carry_out: CarryOut) -> Environment | None:
-        """Emit a statement, by ``carry_out`` where it does not come out as before; return what is known after it."""
+        """Emit a statement, by ``carry_out`` where it cannot be reused; return the ranges known after it."""
         names = self._names_of(statement)
         if names is None:
             return carry_out(statement, known)
@@ -82,7 +80,7 @@ class Repeated:
         return after
 
     def _names_of(self, statement: ast.stmt) -> tuple[str, ...] | None:
-        """Return the names in a statement, None where they are not all that it depends on."""
+        """Return the names in a statement, None where it depends on more than these."""
         key = id(statement)
         if key not in self._names:
             nodes = list(build.nodes(statement))
@@ -103,14 +101,14 @@ def _changed(known: Environment, changes: list[tuple[str, Range | None]]) -> Env
 
 
 CHANGES = "changes"
-"""The list that END of the Python form fills; in C the host compares what a scan gives out with what it latched."""
+"""The list that END of the Python form fills; in C the host compares the outputs of a scan with the latched values."""
 
 
 class ScanBody(Body):
-    """Translates one scan; ``latched`` are the ranges of what it latches, ``written`` the names that it gives out."""
+    """Translates one scan; ``latched`` are the ranges of the latched values, ``written`` the names of its outputs."""
 
     def __init__(self, frame: Frame, latched: Sequence[Range], written: Sequence[str]) -> None:
-        """Take the function, and what goes in and out."""
+        """Create the translation from the function, its latched values and its outputs."""
         super().__init__(frame)
         self._latched, self._written = latched, written
         self._repeated = Repeated(frame, frozenset({CHANGES}))
@@ -180,14 +178,14 @@ def _kind(item: Range) -> Kind:
 
 
 def _member(value: ast.expr) -> str:
-    """Return which member of ``io`` an expression calls."""
+    """Return the member of ``io`` that an expression calls, "" if none."""
     if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute):
         return value.func.attr
     return ""
 
 
 def _names_of_end(statement: ast.If) -> set[str]:
-    """Return the names in the statements of END's own: one that appends a change, one that commits if there are any."""
+    """Return the names in an IF of END, which appends a change, or commits if there are any; empty for others."""
     first = statement.body[0]
     if isinstance(statement.test, ast.Name):
         return {statement.test.id}

@@ -1,7 +1,7 @@
-"""Translation of Python statements, with what is known of each name carried along.
+"""Translation of Python statements, with the known range of each name.
 
-A loop is translated as often as it takes until what is known at its top holds for every turn; what was found is kept,
-so that a loop inside another is not looked through from the beginning each time.
+A loop is translated repeatedly until the ranges known at its top are valid for every turn; the result is kept, so that
+an inner loop does not start from the beginning each time.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ _PASSING = re.compile(r"(b\d+_\w+|t\d+|over|dropped)$")
 """Locals of one block or statement."""
 
 MOST_TURNS = 200
-"""Translations of a loop, each for a wider range of what it begins with; each name takes a few."""
+"""Most translations of a loop, each for wider ranges at its top; each name takes a few."""
 
 
 class Body:
-    """Translates the statements of one function; ``ends`` are the loops around a statement, the inmost last."""
+    """Translates the statements of one function."""
 
     def __init__(self, frame: Frame) -> None:
-        """Take the function."""
+        """Create the translation of a function."""
         self.frame = frame
         self._loops: list[_Loop] = []
         self._depth = 0
 
     def execute(self, statements: list[ast.stmt], known: Environment | None) -> Environment | None:
-        """Emit statements; return what is known after them, None where nothing comes there."""
+        """Emit statements; return the ranges known after them, None where that place is not reached."""
         before, self.frame.touched = self.frame.touched, set()
         self._depth += 1
         known = self._execute(statements, known)
@@ -62,7 +62,7 @@ class Body:
         return known
 
     def _without_passing(self, known: Environment) -> Environment:
-        """Return what is known without the names that nothing reads after a BASIC line of straight code."""
+        """Return the known ranges without the names that nothing reads after a BASIC line of straight code."""
         fields = self.frame.fields
         if self._depth > 1:
             return known
@@ -70,9 +70,9 @@ class Body:
         return known.without(gone) if gone else known
 
     def _held_to_types(self, known: Environment) -> Environment:
-        """Emit, at the end of a BASIC line, that the scan ends where a variable is beyond what it can be.
+        """Emit, at the end of a BASIC line, the end of the scan if a variable is outside its range.
 
-        No block leaves a variable so; but for some, such as RAMP, ranges alone do not show it.
+        No block leaves a variable outside it, but for some, such as RAMP, ranges alone do not prove that.
         """
         frame = self.frame
         for name in sorted(frame.touched):
@@ -97,7 +97,7 @@ class Body:
         return carry_out(self, statement, known)
 
     def asked(self) -> None:
-        """Emit that the scan ends here where something in the statement said so; a function leaves that to the scan."""
+        """Emit the end of the scan if something in the statement requested it; a function leaves that to the scan."""
         if self.frame.asks_end and self.frame.is_scan:
             self.frame.emit("if (*ended) return *ended;")
         self.frame.asks_end = False
@@ -124,7 +124,7 @@ class Body:
             self._assign_one(target, result, known)
 
     def _kept(self, item: Typed) -> Typed:
-        """Return a value in a local of its own: names in it are about to change."""
+        """Return a value in a separate local: names in it are about to change."""
         name = self.frame.temporary(item.range)
         self.frame.emit(f"{name} = {bare(item.text)};")
         return Typed(name, item.range)
@@ -182,7 +182,7 @@ class Body:
         return joined(then, otherwise)
 
     def _test(self, node: ast.expr, known: Environment) -> str:
-        """Return a test in C; one that can end the scan is carried out before."""
+        """Return a test in C; one that can end the scan is evaluated before."""
         test = self.frame.value(node, known)
         if not self.frame.asks_end:
             return test.text
@@ -219,7 +219,7 @@ class Body:
         return joined(leaves, loop.broken)
 
     def _turn(self, statement: ast.While, top: Environment, loop: _Loop) -> Environment | None:
-        """Emit the loop; return what is known where its test fails."""
+        """Emit the loop; return the ranges known where its test fails."""
         frame = self.frame
         begin = len(frame.lines)
         with frame.indented():
@@ -300,7 +300,7 @@ class Body:
 
 
 class _Loop:
-    """What is known where a loop is left by BREAK, and where its turns end."""
+    """The ranges known where a loop is left by BREAK, and where its turns end."""
 
     def __init__(self) -> None:
         self.broken: Environment | None = None

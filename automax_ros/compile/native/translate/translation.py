@@ -1,8 +1,8 @@
-"""Translation of a task's scans to C, from the Python that the compiler makes of them.
+"""Translation of a task's scans to C, from the Python that the compiler generates.
 
 The integers of Python have any size; C's have 64 bits, or 128. So the ranges of all values are followed through the
-scan, from what each variable can hold, and through as many scans as it takes until nothing new comes up: where an
-integer cannot be shown to fit, the task is not native. Doubles need no proof, but for where integers are made of them.
+scan, from the range of each variable, and through as many scans as it takes until they no longer grow: where an integer
+cannot be proved to fit, the task is not native. Doubles need no proof, except where they are converted to integers.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from automax_ros.language.tree.tree import Scope
 
 _RETURN = re.compile("return ([^;]*);")
 MOST_ROUNDS = 60
-"""Translations of a scan, each for a wider range of states, before a task counts as one whose integers have no bounds;
-a state takes a few."""
+"""Most translations of a scan, each for a wider range of states, before the integers of a task count as unbounded; a
+state takes a few."""
 _VARIABLES = (Role.LOCAL, Role.TUNABLE)
 
 
@@ -38,7 +38,7 @@ def translate(compiled: CompiledTask) -> NativeSource:
     """Return the C of a task's scans.
 
     Raises:
-        NotNative: the task is a BASIC task or a drive's, or has a statement that C cannot carry out to the same bits.
+        NotNative: the task is a BASIC task or a drive's, or has a statement that C cannot execute to the same bits.
     """
     return translated(compiled, scans_of(compiled))
 
@@ -47,7 +47,7 @@ def scans_of(compiled: CompiledTask) -> Form:
     """Return the form of a task's scans that is translated.
 
     Raises:
-        NotNative: the task as a whole is none that can be.
+        NotNative: tasks of this kind cannot be native.
     """
     if compiled.program.is_basic:
         raise NotNative("a BASIC task")
@@ -60,17 +60,17 @@ def scans_of(compiled: CompiledTask) -> Form:
 
 
 def translated(compiled: CompiledTask, form: Form) -> NativeSource:
-    """Return the C of scans in the form that ``scans_of`` gives.
+    """Return the C of scans in the form that ``scans_of`` returns.
 
     Raises:
-        NotNative: they have a statement that C cannot carry out to the same bits.
+        NotNative: they have a statement that C cannot execute to the same bits.
     """
     with collections_paused():
         return _Translation(compiled, form).source()
 
 
 def fixed_parts() -> tuple[str, ...]:
-    """Return the texts that stand in the C of each task."""
+    """Return the texts that are part of the C of each task."""
     return tuple(map(_part, ("abi.h", "operations.h", "host_calls.h", "columns.h")))
 
 
@@ -104,13 +104,13 @@ class _Translation:
         self._latched = [of_type(type_of_name(name)) for name in compiled.latched]
 
     def source(self) -> NativeSource:
-        """Return the text and what it takes for granted."""
+        """Return the text and its assumed limits."""
         known = self._settled()
         limits = tuple(_limits_of(known[name]) for name in self._names)
         return NativeSource(self._compiled.program.name, self._text(), limits)
 
     def _settled(self) -> Environment:
-        """Translate until no scan leaves a state that was not thought of before it; return what a state can hold."""
+        """Translate until no scan widens the ranges of the state; return these ranges."""
         body = ScanBody(self._frame, self._latched, self._compiled.written)
         fields = dict(zip(self._names, self._layout.fields, strict=True))
         known = Environment({name: _at_first(field) for name, field in fields.items()})
@@ -125,7 +125,7 @@ class _Translation:
         raise NotNative("a state that has no bounds")
 
     def _leaving(self) -> list[str]:
-        """Return the lines; where fields lie in locals while the scan is under way, each way out puts them back."""
+        """Return the lines; where fields are in locals during the scan, each return stores them back."""
         wide = self._frame.wide_fields
         if not wide:
             return self._frame.lines
@@ -133,7 +133,7 @@ class _Translation:
         return [_RETURN.sub(rf"{{ {back} return \1; }}", line) for line in self._frame.lines]
 
     def _grown(self, name: str, field: StateField, known: Range) -> Range:
-        """Return what a field may hold, as far as it was found until now; a block's integers have an end somewhere."""
+        """Return the range of a field as found so far; the integers of blocks have bounds."""
         if field.role in _VARIABLES or known.kind is None:
             raise NotNative(f"{field.name} may be left with a value beyond its type")
         return self._frame.pinned(name, known)
@@ -171,9 +171,9 @@ class _Translation:
 
 
 def _at_first(field: StateField) -> Range:
-    """Return what a field is known to hold before the first scan: of a variable, and of a REAL, all that the type does.
+    """Return the range of a field before the first scan: for a variable, and for a REAL, the whole range of the type.
 
-    A state that comes from elsewhere may have any REAL.
+    A state from outside may have any REAL.
     """
     if field.role in _VARIABLES or field.type is DataType.REAL:
         return of_type(field.type)
@@ -189,7 +189,7 @@ def _limits_of(known: Range) -> tuple[int, int]:
 
 @cache
 def _part(name: str) -> str:
-    """Return a text that is the same for all tasks."""
+    """Return a C text that is the same for all tasks."""
     return files("automax_ros.compile.native").joinpath(name).read_text(encoding="utf-8")
 
 

@@ -16,9 +16,9 @@ _PARENTHESES = re.compile("[()]")
 
 @dataclass(frozen=True, slots=True)
 class Typed:
-    """A C expression without effects that may stand anywhere an operand may, and what is known of its value.
+    """A C expression without effects, usable as any operand, and the range of its value.
 
-    Of ``mixed`` Python gives an integer or a REAL, as it happens; as a REAL it is the same number.
+    A ``mixed`` one is in Python an integer or a REAL, depending on the values; as a REAL it is the same number.
     """
 
     text: str
@@ -27,14 +27,14 @@ class Typed:
 
     @property
     def whole(self) -> Typed:
-        """The same as an integer's operand: a boolean counts as 0 and 1."""
+        """The same as an integer operand: a boolean counts as 0 and 1."""
         if self.range.kind is Kind.INT:
             return self
         return replace(self, text=f"(int64_t){self.text}", range=replace(self.range, kind=Kind.INT))
 
     @property
     def signed(self) -> str:
-        """The text of an integer in 64 bits or more: C would take a literal, or a boolean, for 32."""
+        """The text of an integer in 64 bits or more: in C a literal, or a boolean, has 32."""
         is_literal = self.text.strip("(-)").isdigit()
         return f"(int64_t){self.text}" if is_literal or self.range.kind is Kind.BOOL else self.text
 
@@ -43,7 +43,7 @@ def literal(value: object) -> Typed:
     """Return a Python literal.
 
     Raises:
-        NotNative: it is none of a number.
+        NotNative: it is not a number or boolean.
     """
     if isinstance(value, bool):
         return Typed("true" if value else "false", exactly(value))
@@ -55,7 +55,7 @@ def literal(value: object) -> Typed:
 
 
 def whole_text(value: int) -> str:
-    """Return an integer as C writes it."""
+    """Return an integer as C text."""
     if abs(value) > INT64_MAX:
         raise NotNative("an integer beyond 64 bits")
     text = f"{abs(value)}" if abs(value) < 2**31 else f"{abs(value)}LL"
@@ -63,7 +63,7 @@ def whole_text(value: int) -> str:
 
 
 def real_text(value: float) -> str:
-    """Return a double as C writes it: the shortest decimals that give its bits."""
+    """Return a double as C text: the shortest decimals that give its bits."""
     if math.isnan(value):
         return "NAN"
     text = "INFINITY" if math.isinf(value) else repr(abs(value))
@@ -71,10 +71,10 @@ def real_text(value: float) -> str:
 
 
 def c_type(known: Range) -> str:
-    """Return the type in C that holds a range.
+    """Return the type in C for a range.
 
     Raises:
-        NotNative: none does, or the kind differs from path to path.
+        NotNative: there is none, or the kind differs from path to path.
     """
     if known.kind is None:
         raise NotNative("a value that is an integer on one path and a REAL on another")
@@ -86,7 +86,7 @@ def c_type(known: Range) -> str:
 
 
 def as_real(value: Typed) -> Typed:
-    """Return a value as Python's arithmetic with a REAL takes it."""
+    """Return a value as an operand of Python's arithmetic with a REAL."""
     if value.range.kind is Kind.REAL:
         return value
     low, high = float(value.range.low), float(value.range.high)

@@ -1,1 +1,1 @@
-"""Checks of CALL: the block, its parameters, what its rules say of them."""
+"""Checks of CALL: the block, its parameters, and its rules for them."""

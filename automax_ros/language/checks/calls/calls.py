@@ -1,4 +1,4 @@
-"""Checks of CALL: the block, its keywords, and what the block's own rules say of them (3.1)."""
+"""Checks of CALL: the block, its keywords, and the block's rules for them (3.1)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Arguments = dict[str, "tuple[Input | Output, Argument]"]
 
 
 def check_call(context: Context, call: Call) -> None:
-    """Report what is wrong in a CALL; bind it to its block where nothing is."""
+    """Report the faults of a CALL; bind it to its block if there are none."""
     block = context.catalogue.get(call.block)
     if block is None:
         message = f"there is no block {call.block}"
@@ -64,7 +64,7 @@ def _elements(context: Context, block: Block, values: Mapping[str, Expression]) 
 
 
 def check_scan_loop(context: Context, call: Call) -> None:
-    """Check the CALL that begins the scan and keep its TICKS, on which the limits of coefficients depend."""
+    """Check the CALL that begins the scan and store its TICKS, on which the limits of coefficients depend."""
     check_call(context, call)
     block = context.catalogue.get(call.block)
     follows = block.line_scan if block is not None and context.target in block.runs_on else None
@@ -89,7 +89,7 @@ def event_name(call: Call) -> str | None:
 
 
 def _arguments_by_keyword(context: Context, block: Block, call: Call) -> Arguments:
-    """Return the arguments with a known keyword and report those given twice."""
+    """Return the arguments with known keywords and report those given twice."""
     given: Arguments = {}
     for argument in call.arguments:
         parameter = block.parameter(argument.keyword)
@@ -128,7 +128,7 @@ def _check_keywords(context: Context, block: Block, call: Call, given: Collectio
 
 
 def _may_stand_whole(context: Context, name: str) -> bool:
-    """Return whether a name without subscripts is an event or an array, which some parameter may want."""
+    """Return whether a name without subscripts is an event or an array, which some parameters accept."""
     symbol = context.symbols.get(name)
     return name in context.events or (symbol is not None and bool(symbol.dimensions))
 
@@ -147,7 +147,7 @@ def _missing_hint(block: Block, name: str) -> str | None:
 def _check_rules(
     context: Context, block: Block, call: Call, given: Arguments, values: Mapping[str, Expression]
 ) -> None:
-    """Report what breaks the block's rules; they see nothing of a parameter that is at fault itself."""
+    """Report broken rules of the block; a parameter that is itself at fault is hidden from the rules."""
     block_name = context.place_of(call.block, call.span)
     seen = {keyword: _seen_by_rules(context, values.get(keyword)) for keyword in given}
     for rule in block.rules:

@@ -1,4 +1,4 @@
-"""Checks of the coefficients that a CALL gives as constants against limits that depend on the scan period."""
+"""Checks the coefficients that a CALL gives as constants against limits that depend on the scan period."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LOOP_TIME_MISS = 0.02
 
 @dataclass(frozen=True)
 class _Sides:
-    """The limits of a parameter as numbers, None for one that cannot be known; ``open_text`` what they leave open."""
+    """The limits of a parameter, None for an unknown one; ``open_text`` has the ranges of variables they depend on."""
 
     low: float | None
     high: float | None
@@ -39,8 +39,9 @@ def check_coefficients(
 ) -> None:
     """Report constants outside of their limits at the task's scan period.
 
-    ``given`` are the keywords of the CALL, ``values`` the arguments among them that are good as such.
-    A limit that reads a variable one is taken where it is loosest; one that reads a bad constant is not checked.
+    ``given`` are the keywords of the CALL, ``values`` the arguments among them that are valid by themselves.
+    A limit that depends on a variable parameter is used where it is loosest; one that depends on a bad constant is not
+    checked.
     """
     period = context.period_s
     if block.coefficients is None or period is None:
@@ -77,7 +78,7 @@ def _sides(
 
 
 def _tuning_range(context: Context, variable: Reference | Element) -> tuple[float, float]:
-    """Return between which values a variable moves: LOW and HIGH of a tunable."""
+    """Return the range of a variable: LOW and HIGH of a tunable."""
     symbol = context.symbols.get(variable.name)
     tuning = None if symbol is None else symbol.tuning
     if tuning is None or isinstance(tuning.low, str) or isinstance(tuning.high, str):
@@ -92,7 +93,7 @@ def _range_text(low: float, high: float) -> str:
 def _check_relation(
     context: Context, block: Block, values: Mapping[str, Expression], known: Mapping[str, float]
 ) -> None:
-    """Report constants that break the relation between them; ``known`` has those within their limits."""
+    """Report constants that break the relation between them; ``known`` are those within their limits."""
     assert block.coefficients is not None
     relation = block.coefficients.relation
     if relation is None or not all(name in known for name in relation.parameters) or relation.holds(known):
@@ -109,7 +110,7 @@ def _check_relation(
 
 
 def _check_own_period(context: Context, declared: Coefficients, given: Expression, period: float) -> None:
-    """Warn of a time between executions that cannot be: the block runs in each scan or each n-th (50)."""
+    """Warn of an impossible time between executions: the block runs in each scan or each n-th (50)."""
     if not isinstance(given, RealLiteral) or any("EVENT" in call.arguments for call in context.calls.values()):
         return
     scans = max(1, round(given.value / period)) if given.value < 1e6 * period else 0

@@ -1,6 +1,7 @@
-"""Checks of tables: one-dimensional INTEGER arrays given whole to a block (sections 13 and 29).
+"""Checks of whole arrays and of data structures that a CALL names.
 
-Checks of data structures: made once, by a SHIFT block of the task, and used as what they are (23, 24, 30 ...).
+Tables are one-dimensional INTEGER arrays (sections 13 and 29). A data structure is made once, by a SHIFT block of the
+task, and used by blocks of its kind (23, 24, 30 ...).
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from automax_ros.language.tree.tree import Argument, Call, Element, Expression, 
 
 
 def find_structures(context: Context, layout: TaskLayout) -> None:
-    """Fill the context's data structures: a block may use one that a SHIFT block further down makes."""
+    """Find the task's data structures in advance: a block may use one that a later SHIFT block makes."""
     for statement, _, _ in layout.numbered():
         block = context.catalogue.get(statement.block) if isinstance(statement, Call) else None
         if isinstance(statement, Call) and block is not None and block.structure is Access.MAKES:
@@ -42,7 +43,7 @@ def _columns(value: Expression | None) -> int:
 
 
 def checked_structure(context: Context, block: Block, parameter: Input, argument: Argument) -> Expression | None:
-    """Report what is wrong in the name of a data structure, and return it."""
+    """Report the faults of a data structure's name, and return it."""
     assert isinstance(parameter.type, Special)
     wanted, value = parameter.type.element, argument.value
     assert wanted is not None
@@ -84,7 +85,7 @@ def _check_made_once(context: Context, name: Reference) -> None:
 
 
 def check_channels(context: Context, block: Block, call: Call, given: Collection[str]) -> None:
-    """Report the channels that a READ or WRITE block programs and its data structure does not have."""
+    """Report channels programmed in a READ or WRITE block that its data structure does not have."""
     if block.structure is not Access.USES:
         return
     structure = structure_of(context, call)
@@ -102,14 +103,14 @@ def check_channels(context: Context, block: Block, call: Call, given: Collection
 
 
 def structure_of(context: Context, call: Call) -> DataStructure | None:
-    """Return the data structure that a CALL names, None where it names none that is known."""
+    """Return the data structure that a CALL names, None where it names no known one."""
     name = next((item.value for item in call.arguments if item.keyword == "STRUCTURE_NAME"), None)
     found = context.structures.get(name.name) if isinstance(name, Reference) else None
     return None if found is None else found[0]
 
 
 def checked_table(context: Context, parameter: Input, argument: Argument) -> Expression | None:
-    """Report what is wrong in an array given to a block, and return it."""
+    """Report the faults of a table given to a block, and return it."""
     whole = _whole_array(context, parameter, argument)
     if whole is None:
         return None
@@ -125,7 +126,7 @@ def checked_table(context: Context, parameter: Input, argument: Argument) -> Exp
 
 
 def checked_array(context: Context, parameter: Output, argument: Argument) -> Expression | None:
-    """Report what is wrong in an array of certain dimensions that a block writes, and return it."""
+    """Report the faults of an array of fixed dimensions that a block writes, and return it."""
     whole = _whole_array(context, parameter, argument)
     if whole is None:
         return None

@@ -1,4 +1,4 @@
-"""Checks of the value given to one parameter of a block: form, type, range, what an output may be (2.4.3, 3.1)."""
+"""Checks the value given to one parameter of a block: form, type, range, and the targets of outputs (2.4.3, 3.1)."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _Constant = IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral
 
 
 def checked_value(context: Context, block: Block, parameter: Input | Output, argument: Argument) -> Expression | None:
-    """Report what is wrong in a parameter's value and return it, a constant with its sign drawn in and rounded.
+    """Report the faults of a parameter's value and return it, a constant with its sign included and rounded.
 
-    None stands for a value at fault.
+    A value at fault gives None.
     """
     before = context.errors
     if isinstance(parameter, Output):
@@ -132,7 +132,7 @@ _CONSTANTS = {
     DataType.REAL: "write a number with a decimal point, such as 1.5",
     DataType.STRING: "write a text in quotes",
 }
-"""What a constant of each type looks like, for hints."""
+"""Hint on how to write a constant of each type."""
 
 
 def _check_literal(context: Context, parameter: Input, kind: DataType, literal: _Constant, written: Expression) -> None:
@@ -181,7 +181,7 @@ def _check_choice(context: Context, parameter: Input, value: float, written: Exp
 
 
 def _report_expression(context: Context, parameter: Input | Output, kind: object, value: Expression) -> None:
-    """Report an expression where a block takes only a variable or a constant."""
+    """Report an expression where a block accepts only a variable or a constant."""
     operand = value.operand if isinstance(value, Unary) else None
     hint = "assign it to a LOCAL variable first"
     if isinstance(operand, (Reference, Element)) and operand.type is DataType.BOOLEAN:
@@ -215,7 +215,7 @@ def _is_of(literal: _Constant, kind: DataType) -> bool:
 
 
 def _spelling(literal: _Constant) -> str:
-    """Return how a number is written, ``.`` for a constant that is none or has no known spelling."""
+    """Return how a number is written, ``.`` for a constant that is not a number or has no known spelling."""
     if isinstance(literal, IntegerLiteral):
         return str(literal.value)
     return literal.text or "." if isinstance(literal, RealLiteral) else "."

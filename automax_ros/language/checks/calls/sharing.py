@@ -14,7 +14,7 @@ Use = tuple[Span, "int | None"]
 def check_sharing(context: Context, layout: TaskLayout) -> None:
     """Warn once for every latched common that blocks and BASIC statements of the scan both use.
 
-    What stands before SCAN_LOOP does not count: it runs before the first latch, and the manual wants it there.
+    Statements before SCAN_LOOP do not count: they run before the first latch, and the manual places them there.
     """
     by_blocks: dict[str, Use] = {}
     by_basic: dict[str, Use] = {}

@@ -1,6 +1,6 @@
 """Checks of events, times, channels and ports (J-3675 6.6 to 6.8).
 
-A number after # is one thing in the whole task: a port, or one end of a channel (decision).
+A number after # means the same in the whole task: a port, or one end of a channel (decision).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ PORTS = ("PORTA", "PORTB")
 
 
 def find_files(context: Context, layout: TaskLayout) -> None:
-    """Fill the context's files from the OPEN statements, and report what cannot be opened."""
+    """Find the context's files in the OPEN statements, and report those that cannot be opened."""
     first: dict[int, Span] = {}
     if context.kind is TaskKind.BASIC and context.target is Platform.UDC:
         context.line = None
@@ -71,7 +71,7 @@ def _opened(statement: OpenChannel | OpenPort) -> OpenedFile:
 
 
 def check_waiting(context: Context, statement: Statement) -> None:
-    """Report what is wrong in one statement of events, times, channels or ports; others are left alone."""
+    """Report the faults of one statement of events, times, channels or ports; ignore others."""
     check = _CHECKS.get(type(statement))
     if check is not None:
         check(context, statement)
@@ -136,7 +136,7 @@ def _check_number(context: Context, number: int, span: Span) -> bool:
 
 
 def _file(context: Context, number: int, span: Span) -> OpenedFile | None:
-    """Return what a number is; a number that nothing opens is reported."""
+    """Return the file of a number; a number that nothing opens is reported."""
     opened = context.files.get(number)
     if opened is None and _check_number(context, number, span) and "OPEN" not in context.broken.words:
         hint = f"for example OPEN CHANNEL FOR INPUT AS FILE #{number}, TYPE = (I), DEPTH = 8"

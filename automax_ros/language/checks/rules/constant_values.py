@@ -1,4 +1,4 @@
-"""Values of constant expressions, as far as the checker can know them, and whether they fit a variable."""
+"""Values of constant expressions, as far as the checker can compute them, and whether they fit a variable."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Literal = (IntegerLiteral, RealLiteral, StringLiteral, BooleanLiteral)
 
 
 def constant_value(expression: Expression) -> Value | None:
-    """Return what an expression of constants, signs and ``+ - * /`` gives, None where it cannot be known.
+    """Return the value of an expression of constants, signs and ``+ - * /``, None where it is not known.
 
     Integers divide as at run time, truncating toward zero; a result outside of 32 bits counts as not known.
     """
@@ -57,7 +57,7 @@ def is_constant(expression: Expression) -> bool:
 
 
 def literal_of(expression: Expression) -> IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral | None:
-    """Return the constant with its sign drawn in (``-5`` becomes one literal), None where it is not a constant.
+    """Return the constant with its sign included (``-5`` becomes one literal), None where it is not a constant.
 
     A literal of a REAL parameter is rounded to what a REAL variable holds (decision).
     """
@@ -74,7 +74,7 @@ def literal_of(expression: Expression) -> IntegerLiteral | RealLiteral | StringL
 
 
 def fits(value: Value, kind: DataType) -> bool:
-    """Return whether a number, its fraction cut off for an integer, lies in the range of a numeric type."""
+    """Return whether a number, truncated for an integer, is in the range of a numeric type."""
     if isinstance(value, (bool, str)) or not kind.is_numeric:
         return True
     if kind is DataType.REAL:

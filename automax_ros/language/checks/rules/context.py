@@ -1,6 +1,6 @@
-"""What the parts of the checker share: the symbols found so far and where findings go.
+"""Shared by the parts of the checker: the symbols found so far, the findings, and the content of broken lines.
 
-What stands on lines that the parser could not read, so that one broken line causes no second error elsewhere.
+A broken line is one that the parser could not read; its content is kept so that it causes no second error elsewhere.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _DECLARING = frozenset({"LOCAL", "COMMON", "GLOBAL", "EVENT"})
 class BrokenLines:
     """The logical lines with a syntax error.
 
-    ``words`` stand on any of them, ``declared`` on those that declare something; ``numbers`` are their line numbers.
+    ``words`` are on any of them, ``declared`` on those that declare something; ``numbers`` are their line numbers.
     """
 
     words: frozenset[str] = frozenset()
@@ -47,7 +47,7 @@ class BrokenLines:
 
 
 def broken_lines(source: SourceText, diagnostics: Iterable[Diagnostic]) -> BrokenLines:
-    """Return what stands on the lines on which the parser reported errors, physical lines joined by ``&``."""
+    """Return the content of the lines on which the parser reported errors, physical lines joined by ``&``."""
     lines = source.lines
     begins = _beginnings(lines)
     words: set[str] = set()
@@ -86,9 +86,9 @@ class Context:
     """One check of one task.
 
     ``lines`` are the physical lines of its text; ``line`` is the BASIC line number in force, None before the first.
-    ``files`` are what the numbers after # of a BASIC task are. ``scan_block`` is the block that begins its scans, "" as
-    long as none is found. ``structures`` are the data structures by name, with the
-    span of the name where its SHIFT block makes it.
+    ``files`` are the ports and channels by their numbers after # in a BASIC task. ``scan_block`` is the block that
+    begins its scans, "" as long as none is found. ``structures`` are the data structures by name, with the span of the
+    name where its SHIFT block makes it.
     """
 
     target: Platform
@@ -130,11 +130,11 @@ class Context:
 
     @property
     def errors(self) -> int:
-        """The number of errors found so far, warnings left out."""
+        """The number of errors found so far, without warnings."""
         return sum(PROBLEMS[item.code].severity is Severity.ERROR for item in self.diagnostics)
 
     def place_of(self, word: str, span: Span) -> Span:
-        """Return where a word stands in a stretch of the text, the stretch itself where it is not on its first line."""
+        """Return the place of a word in a span of the text, the span itself if the word is not on its first line."""
         if not 1 <= span.line <= len(self.lines):
             return span
         pattern = re.compile(rf"(?<![A-Z0-9_]){re.escape(word)}(?![A-Z0-9_])", re.IGNORECASE)
@@ -143,15 +143,15 @@ class Context:
 
     @property
     def period_s(self) -> float | None:
-        """The scan period T in seconds, None as long as TICKS is not known to be good."""
+        """The scan period T in seconds, None as long as TICKS is not known to be valid."""
         return None if self.ticks is None else self.ticks * self.tick_ns / 1e9
 
     def is_broken(self, blocks: Iterable[Block]) -> bool:
-        """Return whether a line that could not be read mentions one of some blocks."""
+        """Return whether a line that could not be read mentions one of these blocks."""
         return any(block.name in self.broken.words for block in blocks)
 
     def is_input_point(self, name: str) -> bool:
-        """Return whether the rack defines a common as an input, which nothing but the rack writes."""
+        """Return whether the rack defines a common as an input, which only the rack writes."""
         spec = self.commons.get(name) if self.commons is not None else None
         symbol = self.symbols.get(name)
         return spec is not None and spec.is_input and symbol is not None and symbol.scope.value == "COMMON"

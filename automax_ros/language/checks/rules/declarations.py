@@ -1,6 +1,7 @@
-"""Checks of LOCAL, COMMON and EVENT: every name once, sizes in bounds, in agreement with the rack (2.4).
+"""Checks of LOCAL, COMMON and EVENT, and of tunables.
 
-Checks of a tunable's bracket: constants of its type, CURRENT inside LOW and HIGH, a positive STEP (2.4.5).
+Every name is declared once, with sizes in bounds and in agreement with the rack (2.4). The bracket of a tunable has
+constants of its type, CURRENT between LOW and HIGH, and a positive STEP (2.4.5).
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from automax_ros.language.tree.tree import Declaration, Declared, Event, Express
 
 
 def tuning_limits(context: Context, scope: Scope, declared: Declared) -> TuningLimits | None:
-    """Return the tuning of a declared tunable, None where its bracket is at fault, which is reported.
+    """Return the tuning of a declared tunable; report a bracket at fault and return None.
 
     A tunable's HIGH and LOW default to its type's range, STEP to 1, for a REAL to the smallest magnitude (decision).
     """
@@ -96,7 +97,7 @@ MAX_TIMEOUT = 32767
 
 
 def check_declarations(context: Context, layout: TaskLayout) -> None:
-    """Fill the context's symbols and events and report what is wrong with their declarations."""
+    """Enter the declared symbols and events into the context, and report the faults of their declarations."""
     top = {id(statement) for statement in (*layout.startup, *layout.scan)}
     events: list[tuple[Event, int | None]] = []
     for statement, line, after in layout.numbered():
@@ -147,7 +148,7 @@ def _declare(context: Context, scope: Scope, declared: Declared) -> None:
 
 
 def _dimensions(context: Context, declared: Declared) -> tuple[int, ...]:
-    """Return the numbers of elements; a dimension that is out of bounds counts as large as allowed."""
+    """Return the numbers of elements; a dimension that is out of bounds counts as the largest allowed."""
     name, subscripts = declared.name, declared.subscripts
     if len(subscripts) > MAX_DIMENSIONS:
         context.report(
@@ -212,7 +213,7 @@ def _check_total(context: Context) -> None:
 
 
 def _compare_with_rack(context: Context, symbol: Symbol, commons: Mapping[str, CommonSpec]) -> None:
-    """Report a COMMON that the rack lacks or defines otherwise: the hardware's E0."""
+    """Report a COMMON that the rack lacks or defines differently: the hardware's E0."""
     spec = commons.get(symbol.name)
     if spec is None:
         twins = [item for name, item in sorted(commons.items()) if bare_name(name) == bare_name(symbol.name)]

@@ -1,8 +1,8 @@
-"""Checks of expressions: every name declared and used as what it is, every operator and function with types it takes.
+"""Checks of expressions, including calls of built-in functions.
 
-A type of None means that an error inside was reported and hides the type; nothing is reported twice on its account.
-
-Checks of calls of built-in functions: known, allowed, number and kinds of arguments.
+Every name is declared and used as declared, every operator has types that it accepts. A function is known and allowed,
+with the right number and kinds of arguments. A type of None means that an error inside was reported and hides the type;
+so it causes no second report.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from automax_ros.language.tree.tree import (
 
 
 def check_function(context: Context, call: FunctionCall, types: list[DataType | None]) -> DataType | None:
-    """Report what is wrong in a call whose arguments have these types, and return the type of its value."""
+    """Report the faults of a call whose arguments have these types, and return the type of its value."""
     function = FUNCTIONS[call.name]
     if context.target.value not in function.targets:
         message = f"{call.name} cannot be used in {context.task_words}"
@@ -99,7 +99,7 @@ _RANGES: dict[str, tuple[int, float, float, str]] = {
     "ROTATEL%": _PLACES,
     "ROTATER%": _PLACES,
 }
-"""Functions with a limited argument: its place, its limits, and what it takes (see functions.py)."""
+"""Functions with a limited argument: its place, its limits, and these in words (see ``tree/functions``)."""
 _WORDS = {Argument.NUMBER: "a number", Argument.INTEGER: "an integer", Argument.STRING: "a string"}
 
 
@@ -108,7 +108,7 @@ _HEXADECIMAL = re.compile(r"[A-F][0-9A-F]{0,7}H")
 
 
 def check_expression(context: Context, expression: Expression) -> DataType | None:
-    """Report what is wrong in an expression and return its type."""
+    """Report the faults of an expression and return its type."""
     if isinstance(expression, Binary):
         return _check_chain(context, expression)
     if isinstance(expression, Unary):
@@ -137,10 +137,10 @@ def _report_structure(context: Context, target: Reference | Element) -> None:
 
 
 def check_variable(context: Context, target: Reference | Element) -> DataType | None:
-    """Report a variable that is not declared or not used as what it was declared, and return its type.
+    """Report a variable that is not declared, or not used as declared, and return its type.
 
-    The type counts as not known where a whole array stands for a value, and where the variable is not declared but one
-    with another type character is: that one was meant.
+    The type counts as not known where a whole array is used as a value, and where the variable is not declared but one
+    with another type character is: that one was probably meant.
     """
     if target.name in context.structures:
         _report_structure(context, target)

@@ -1,4 +1,4 @@
-"""Checks of the flow of a task: where jumps may go, and what can be reached (section 4, semantics BASIC)."""
+"""Checks of the flow of a task: targets of jumps, statements that are never reached (section 4, semantics BASIC)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _IDLE = (Remark, Data, Declaration, Event, Label)
 
 
 class Region(enum.Enum):
-    """The part of a task in which a line lies."""
+    """The part of a task to which a line belongs."""
 
     STARTUP = "before SCAN_LOOP"
     LOOP = "the beginning of the scan"
@@ -42,7 +42,7 @@ class Region(enum.Enum):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a statement lies: ``blocks`` are the IF and FOR bodies around it, outermost first."""
+    """The place of a statement: ``blocks`` are the IF and FOR bodies around it, outermost first."""
 
     region: Region
     blocks: tuple[int, ...]
@@ -51,7 +51,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Jump:
-    """One line that a statement may go to."""
+    """A line to which a statement may jump."""
 
     line: int
     place: Place
@@ -60,10 +60,10 @@ class Jump:
 
 
 def check_flow(context: Context, layout: TaskLayout) -> None:
-    """Report jumps that cannot be made, RESTOREs without DATA, statements that are never reached.
+    """Report impossible jumps, RESTOREs without DATA, and statements that are never reached.
 
-    What a wrong jump, or one on a line that could not be read, would have reached is not known; then nothing counts as
-    never reached.
+    Where a wrong jump, or one on a line that could not be read, should lead is not known; then nothing counts as never
+    reached.
     """
     places, jumps = _collect(layout)
     before = len(context.diagnostics)
@@ -163,7 +163,7 @@ def _check_returns(context: Context, layout: TaskLayout) -> None:
 
 
 def _check_restores(context: Context, layout: TaskLayout, places: dict[int, Place]) -> None:
-    """RESTORE takes a line that exists and has DATA in it or after it."""
+    """Report a RESTORE whose line does not exist or has no DATA in it or after it."""
     data = [line or 0 for line, _ in context.data]
     for statement, line, _ in layout.numbered():
         if not isinstance(statement, Restore) or "DATA" in context.broken.words:
@@ -183,7 +183,7 @@ def _check_restores(context: Context, layout: TaskLayout, places: dict[int, Plac
 def _check_reached(
     context: Context, statements: tuple[Statement, ...], targets: frozenset[int], line: int | None
 ) -> int | None:
-    """Report the first statement of each stretch that nothing reaches; return the line number in force at the end."""
+    """Report the first statement of each unreachable sequence; return the line number in force at the end."""
     ended: Span | None = None
     for statement in statements:
         line = line if statement.number is None else statement.number
@@ -202,7 +202,7 @@ def _check_reached(
 
 
 def _up_to_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
-    """Return the statements before END; what stands after it is an error of its own."""
+    """Return the statements before END; those after it are a separate error."""
     at = next((index for index, item in enumerate(statements) if isinstance(item, End)), len(statements))
     return statements[:at]
 

@@ -1,4 +1,4 @@
-"""Checks of BASIC statements: what they may write, and the types they need."""
+"""Checks of BASIC statements: their targets, and the types that they need."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _KINDS = {DataType.STRING: "string", DataType.BOOLEAN: "boolean"}
 
 
 def check_statement(context: Context, statement: Statement) -> None:
-    """Report what is wrong in one BASIC statement itself, not in those inside it."""
+    """Report the faults of one BASIC statement itself, not of those inside it."""
     if isinstance(statement, Assignment):
         _check_assignment(context, statement)
     elif isinstance(statement, If):
@@ -81,7 +81,7 @@ def data_pool(context: Context) -> tuple[tuple[Value, ...], tuple[tuple[int, int
 
 
 def check_reads(context: Context, reads: list[tuple[Read, int | None]]) -> None:
-    """Report READs that cannot find a value of their kind anywhere in the task's DATA."""
+    """Report READs for which the task's DATA have no value of the right kind."""
     values, _ = data_pool(context)
     if "DATA" in context.broken.words:
         return
@@ -106,7 +106,7 @@ def assignable(target: DataType, value: DataType) -> bool:
 
 
 def check_constant_fits(context: Context, expression: Expression, kind: DataType, what: str) -> None:
-    """Report a constant that a variable of a numeric type cannot hold; no REAL at all is the parser's to report."""
+    """Report a constant that a variable of a numeric type cannot hold; the parser reports those beyond every REAL."""
     value = constant_value(expression)
     if isinstance(value, float) and not fits(value, DataType.REAL):
         return

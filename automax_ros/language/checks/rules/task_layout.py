@@ -1,4 +1,4 @@
-"""Where the parts of a task lie: what stands before SCAN_LOOP, SCAN_LOOP itself, and the scan up to END (section 4)."""
+"""Finds the parts of a task: the part before SCAN_LOOP, SCAN_LOOP itself, and the scan up to END (section 4)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class TaskLayout:
     scan_loop_line: int | None = None
 
     def numbered(self) -> Iterator[tuple[Statement, int | None, bool]]:
-        """Yield every statement but SCAN_LOOP with the line number in force, and whether it stands after SCAN_LOOP."""
+        """Yield every statement but SCAN_LOOP with the line number in force, and whether it is after SCAN_LOOP."""
         for statement, line in statements_in_order(self.startup):
             yield statement, line, False
         for statement, line in statements_in_order(self.scan, self.scan_loop_line):
@@ -30,7 +30,7 @@ class TaskLayout:
 
 
 def find_layout(context: Context, module: Module) -> TaskLayout:
-    """Split a task at its SCAN_LOOP and report what is wrong with SCAN_LOOP and END; a BASIC task is all one part."""
+    """Split a task at its SCAN_LOOP and report the faults of SCAN_LOOP and END; a BASIC task has only one part."""
     loops = [
         (statement, line)
         for statement, line in statements_in_order(module.statements)
@@ -142,7 +142,7 @@ def _end_of_text(module: Module) -> Span:
 
 
 def _last(module: Module) -> Statement | None:
-    """Return the last statement of the text, which may stand inside a block."""
+    """Return the last statement of the text, which may be inside a block."""
     last = module.statements[-1] if module.statements else None
     while last is not None and any(bodies(last)):
         last = [body for body in bodies(last) if body][-1][-1]

@@ -1,8 +1,8 @@
 """Types of expressions: purely syntactic, from type characters, constants and the function table (J-3675 chapter 5).
 
-Integers of both widths are worked in 32 bits, so every integer operation gives DOUBLE; REAL wins over integers; a
-boolean counts as 0 or 1 next to an arithmetic operator or next to an integer, and two booleans give a boolean only with
-AND, OR, XOR and NOT. Nothing turns into a string or a boolean by itself.
+Integers of both widths are computed in 32 bits, so every integer operation gives DOUBLE; with a REAL operand it gives
+REAL. A boolean counts as 0 or 1 next to an arithmetic operator or next to an integer, and two booleans give a boolean
+only with AND, OR, XOR and NOT. Nothing is converted to a string or a boolean implicitly.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def type_of(expression: Expression) -> DataType:
     A decimal or hex constant is INTEGER up to 32767, above that DOUBLE; a variable or element has the type of its name.
 
     Raises:
-        ValueError: an operator has operands that it cannot take, which the checker refuses.
+        ValueError: an operator has operands that it does not accept, which the checker refuses.
         KeyError: a function is not in the table, which the checker refuses too.
     """
     if isinstance(expression, Binary):
@@ -58,9 +58,9 @@ def literal_integer_type(literal: IntegerLiteral) -> DataType:
 
 
 def unary_type(operator: str, operand: DataType) -> DataType | None:
-    """Return the type of ``-``, ``+`` or ``NOT`` before an operand, None where it cannot stand there.
+    """Return the type of ``-``, ``+`` or ``NOT`` before an operand, None where it is not allowed there.
 
-    A sign keeps REAL and makes DOUBLE of an integer; NOT complements a boolean or, bit by bit, an integer.
+    A sign of a REAL gives REAL, of an integer DOUBLE; NOT complements a boolean or, bit by bit, an integer.
     """
     if operator == "NOT":
         return DataType.BOOLEAN if operand is DataType.BOOLEAN else DataType.DOUBLE if operand.is_integer else None
@@ -70,7 +70,7 @@ def unary_type(operator: str, operand: DataType) -> DataType | None:
 
 
 def binary_type(operator: str, left: DataType, right: DataType) -> DataType | None:
-    """Return the type of an operation on two operands, None where the operator cannot join them.
+    """Return the type of an operation on two operands, None where the operator does not accept them.
 
     * ``+ - * / **``: REAL if an operand is REAL, else DOUBLE; booleans count as 0 or 1. ``+`` joins two strings.
     * relational: BOOLEAN, for two numbers; two strings or two booleans only with ``=`` and ``<>``.
@@ -92,7 +92,7 @@ def binary_type(operator: str, left: DataType, right: DataType) -> DataType | No
 def spine(expression: Binary) -> tuple[Expression, list[Binary]]:
     """Return the leftmost operand of a chain ``a + b + c ...`` and its operations from left to right.
 
-    A chain of one level leans to the left as deep as it is long; walking it so keeps the recursion flat.
+    The tree of a chain is as deep to the left as the chain is long; walking it in this way avoids deep recursion.
     """
     operations = []
     first: Expression = expression

@@ -1,8 +1,6 @@
 """Forms of the language that no source confirms: their spelling or meaning is ours (decision).
 
-``automax check --json`` marks what it says about them, so that a user of a real rack knows where to be careful.
-
-Finds the forms of a task that no source confirms, so that ``automax check --json`` can mark them.
+``automax check --json`` marks their uses in a task, so that users of a real rack know where to be careful.
 """
 
 from __future__ import annotations
@@ -31,16 +29,16 @@ UNCONFIRMED_STATEMENTS: dict[str, str] = {
     "SET": "SET in a control-block task: no source lists it there",
     "TUNABLE": "LOCAL NAME [CURRENT=..., HIGH=..., LOW=..., STEP=...]: the bracket and its keys",
 }
-"""Statements and parts of statements, with what is not confirmed of them."""
+"""Statements and parts of statements, with the parts of them that are not confirmed."""
 
 UNCONFIRMED_FUNCTIONS: dict[str, str] = {
     name: f"{name}: the name and its arguments" for name, function in FUNCTIONS.items() if function.unconfirmed
 }
-"""Functions, with what is not confirmed of them."""
+"""Functions, with the parts of them that are not confirmed."""
 
 
 def find_unconfirmed(module: Module, kind: TaskKind) -> list[tuple[Span, str]]:
-    """Return the places of unconfirmed forms in the order of the text, each with what is not confirmed of it."""
+    """Return the places of unconfirmed forms in the order of the text, each with its unconfirmed part."""
     found: list[tuple[Span, str]] = []
     for statement, _ in statements_in_order(module.statements):
         found += _of_statement(statement, kind)
