@@ -136,12 +136,12 @@ THREADS = {
 PROGRAM = """
 import sys, time
 sys.path.append(sys.argv[2])
-from automax_ros.parallel.job import Piece, Where
+from automax_ros.parallel.job import Job, Workers
 from automax_ros.parallel.run import run_pieces
-from pieces import works
+from parallel import works
 {thread}
 try:
-    run_pieces([Piece(str(n), works.long, (sys.argv[1], n)) for n in range(2)], Where(2))
+    run_pieces([Job(str(n), works.long, (sys.argv[1], n)) for n in range(2)], Workers(2))
 except KeyboardInterrupt:
     print("interrupted")
 """
@@ -174,14 +174,14 @@ def test_no_worker_outlives_the_one_that_gives_it_pieces(tmp_path, number, threa
 COPIED = """
 import atexit, sys, time
 sys.path.append(sys.argv[1])
-from automax_ros.parallel.job import Piece, Where
+from automax_ros.parallel.job import Job, Workers
 from automax_ros.parallel.run import run_pieces
-from pieces import works
+from parallel import works
 works.marks.append(7)
 {thread}
 atexit.register(print, "at its end")
 print("begun")
-print([item.result for item in run_pieces([Piece(str(n), works.marked, (n,)) for n in range(4)], Where(2))])
+print([item.result for item in run_pieces([Job(str(n), works.marked, (n,)) for n in range(4)], Workers(2))])
 """
 
 

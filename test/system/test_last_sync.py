@@ -12,14 +12,14 @@ from system.support import PATIENCE_S, ROOT, TYPES, Automax
 READY = "Ctrl-C ends the run"
 REFUSING = """\
 import os, sys
-from automax_ros.cli import recording_watch
 from automax_ros.cli.main import main
+from automax_ros.cli.run import saving
 
 def refuse(_):
     raise OSError(5, "Input/output error")
 
 os.fsync = refuse
-recording_watch.SYNC_PERIOD_S = 1000.0  # so that no sync but the last one is ever made
+saving.SYNC_PERIOD_S = 1000.0  # so that no sync but the last one is ever made
 sys.exit(main(sys.argv[1:]))
 """
 

@@ -176,11 +176,11 @@ def test_a_process_asked_to_end_before_it_heeds_signals_has_ended_well():
 def test_children_end_with_a_watcher_that_is_killed(tmp_path):
     """SIGKILL lets nobody clean up: the children notice by themselves."""
     watcher = (
-        f"from automax_ros.cli.run.supervisor import Post, Supervisor\nchild = {program(WAITS)!r}\n"
+        f"from automax_ros.cli.run.supervisor import ProcessSpec, Supervisor\nchild = {program(WAITS)!r}\n"
         "class Heard:\n"
         "    def heard(self, name, told): print(name, told.text, supervisor.pids[name], flush=True)\n"
         "    complained = died = print\n"
-        "supervisor = Supervisor([Post('one', child), Post('two', child)], Heard())\n"
+        "supervisor = Supervisor([ProcessSpec('one', child), ProcessSpec('two', child)], Heard())\n"
         "supervisor.run(lambda: False)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", watcher], stdout=subprocess.PIPE, text=True)

@@ -50,7 +50,7 @@ def test_the_rack_files_page_has_every_key_and_range():
     assert shown["line"] == {*keys.SUPPLY, "rotation"}
     assert shown["load"] == {*keys.LOAD, "torque_per_rpm", "ros", "or"}
     assert shown["couple"] == set(couples.KEYS)
-    assert set(feeds.KEYS) <= shown["feeds"]
+    assert set(keys.FEED_KEYS) <= shown["feeds"]
     for key, ranges in (("line", keys.SUPPLY), ("load", keys.LOAD), ("couple", couples.RANGES)):
         for low, high in ranges.values():
             text = f"{low:g} to {high:g}".replace("e+0", "e")

@@ -23,7 +23,7 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from std_msgs.msg import Int16
 
-from automax_ros.ros.intake.guard import Guard
+from automax_ros.ros.intake.guard import RequestGuard
 from automax_ros.ros.setup.process import RosProcess
 from automax_ros.runtime.health import Health
 
@@ -46,7 +46,7 @@ def come_and_go() -> None:
 comes = threading.Thread(target=come_and_go)
 comes.start()
 process, health = RosProcess(), Health()
-process.spin(Guard(health, print))
+process.spin(RequestGuard(health, print))
 for cycle in range(CYCLES):
     met.clear()
     with process.resting():
