@@ -13,7 +13,7 @@ PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-
 
 # What runs a second time in plain Python; the whole suite runs with the modules that were compiled ahead of time.
 PLAIN := test/drive/current_loop test/drive/base/test_state.py test/drive/plant/test_plant.py test/drive/base/test_motor.py test/runtime \
-	test/messages/stream/test_prepared.py
+	test/messages/stream/test_templates.py
 
 # .venv brings its own ROS 2. A sourced distribution or another environment must not mix its libraries in.
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)

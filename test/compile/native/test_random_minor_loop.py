@@ -13,7 +13,7 @@ from automax_ros.blocks.declare.declaration import Form, Input
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
-from compile.lowering.test_minor_loop import FORMS
+from compile.lowering.test_calls import FORMS
 from compile.support import compiled_of, repeatable
 
 BLOCK = CATALOGUE["DC_DRIVE_CML"]

@@ -14,7 +14,7 @@ from automax_ros.rackfile.model.writers import ROS_WRITER
 from automax_ros.ros.intake.intake import MOST_OF_ONE, MOST_ROUNDS_FIRST, MessageIntake
 from automax_ros.ros.setup.arguments import split_arguments
 from automax_ros.runtime.time.simulated_pacer import LEAST_TICK_NS, MOST_TICK_NS, SimulatedTime
-from ros.intake.test_requests import parameter
+from ros.intake.test_service_requests import parameter
 from ros.support import until
 
 EPOCH_NS = 1_700_000_000 * NS_PER_S

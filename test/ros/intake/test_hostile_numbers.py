@@ -7,7 +7,7 @@ from system.support import RACKS, Client
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from ros.intake.test_requests import parameter
+from ros.intake.test_service_requests import parameter
 from ros.support import until
 
 MOST = (1 << 63) - 1

@@ -9,7 +9,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.ros.setup.arguments import split_arguments
 from automax_ros.ros.setup.parameter_files import RosArgumentsError
-from ros.intake.test_requests import answer, parameter
+from ros.intake.test_service_requests import answer, parameter
 from ros.support import until
 
 

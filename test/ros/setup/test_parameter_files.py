@@ -201,7 +201,7 @@ def test_the_last_one_counts(tmp_path):
 def test_file_of_the_page(tmp_path):
     """The example of docs/ros.md names a tunable of the section drive, and a value that its task takes."""
     page = (ROOT / "docs" / "ros.md").read_text(encoding="utf-8")
-    example = page.partition("<!-- run by test/ros/setup/test_ros_parameters.py -->\n```yaml\n")[2].partition("```")[0]
+    example = page.partition("<!-- run by test/ros/setup/test_parameter_files.py -->\n```yaml\n")[2].partition("```")[0]
     (found,) = read(tmp_path, example)
     rack = Rack(load(ROOT / "config" / "section_drive" / "rack.yaml").config)
     task, _, name = found.name.partition(".")
