@@ -12,8 +12,8 @@ CONFIG ?= config/dc_drive/rack.yaml
 PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # What runs a second time in plain Python; the whole suite runs with the modules that were compiled ahead of time.
-PLAIN := test/drive/cml test/drive/test_state.py test/drive/test_plant.py test/drive/test_motor.py test/running \
-	test/wire/test_prepared.py
+PLAIN := test/drive/current_loop test/drive/base/test_state.py test/drive/plant/test_plant.py test/drive/base/test_motor.py test/runtime \
+	test/messages/stream/test_prepared.py
 
 # .venv brings its own ROS 2. A sourced distribution or another environment must not mix its libraries in.
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)

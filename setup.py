@@ -111,7 +111,7 @@ class EggInfo(egg_info):
                 f"error: {NAME} cannot run: {wrong}. colcon looks for no package inside a package's folder, "
                 "unless it is told where. In the workspace, with the options that you gave, type\n\n"
                 f"  colcon build --base-paths . {shlex.quote(str(HERE / 'msg_defs'))}\n\n"
-                'README.md, "In a ROS 2 workspace", has the file that says it once.'
+                "docs/howto/workspace.md has the file that tells colcon once and for all."
             )
         super().run()
 

@@ -10,22 +10,9 @@ here, and loaded when it is asked for: `from automax_ros import Rack, load`.
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from automax_ros.core import compiled
-
-if TYPE_CHECKING:
-    from automax_ros.parallel.job import Where as Where
-    from automax_ros.rack.base.observers import RackObserver as RackObserver
-    from automax_ros.rack.base.stop_cause import OperationRefused as OperationRefused
-    from automax_ros.rack.rack import Rack as Rack
-    from automax_ros.rackfile.loader import load as load
-    from automax_ros.ros.rack_nodes import RackNodes as RackNodes
-    from automax_ros.ros.setup.environment import prepare as prepare
-    from automax_ros.scenario.report import report_of as report_of
-    from automax_ros.scenario.stepping.stepper import Stepper as Stepper
-    from automax_ros.scenario.stimuli.player import Stimulation as Stimulation
-    from automax_ros.scenario.stimuli.reader import read_for_rack as read_for_rack
 
 __version__ = "0.1.0"
 
@@ -35,14 +22,15 @@ _HOMES = {
     "RackNodes": "ros.rack_nodes",
     "RackObserver": "rack.base.observers",
     "Stepper": "scenario.stepping.stepper",
-    "Stimulation": "scenario.stimuli.player",
-    "Where": "parallel.job",
+    "StimuliPlayer": "scenario.stimuli.player",
+    "Workers": "parallel.job",
     "load": "rackfile.loader",
     "prepare": "ros.setup.environment",
     "read_for_rack": "scenario.stimuli.reader",
     "report_of": "scenario.report",
 }
-"""The modules of the names that are imported from the package itself."""
+"""The modules of the names that are imported from the package itself; without their types, or each edit of a node would
+make what was compiled ahead of time stale."""
 
 compiled.install(__path__[0])
 

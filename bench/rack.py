@@ -18,12 +18,12 @@ from _harness import ANSWER, Other, answer, seconds_in_turn, wall_s
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms, NativeMode
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.parallel.job import Where
+from automax_ros.parallel.job import Workers
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig, Timing
 from automax_ros.recordings.write.recorder import Recorder
-from automax_ros.sweep.blueprint import Blueprint
+from automax_ros.sweep.blueprint import RackTemplate
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.points import Point, grid, read_varied
 from automax_ros.sweep.run import Plan, run_points
@@ -59,7 +59,7 @@ def sweeps(config: RackConfig) -> None:
     varied = read_varied(rack, f"SPEED.KP_SPEED=5:80:{SWEEP_RUNS}")
     duration_ns = seconds_ns(SWEEP_SECONDS)
     measures = read_measures("rms(SPEED_ERR%) settle(SPEED_FDBK%, 2 %) max(CUR_REF%)", config, duration_ns)
-    plan = Plan(Blueprint.of(rack), (varied.quantity,), measures, duration_ns)
+    plan = Plan(RackTemplate.of(rack), (varied.quantity,), measures, duration_ns)
     points = grid([varied])
     run_points(plan, points[:1])
     one_each = [partial(run_points, plan, [point]) for point in points]
@@ -77,7 +77,7 @@ def sweeps(config: RackConfig) -> None:
 
 def sweep_s(plan: Plan, points: list[Point], jobs: int, _: int) -> float:
     """Return the wall time of a sweep with its start, s."""
-    return wall_s(lambda: run_sweep(plan, points, Where(jobs)))
+    return wall_s(lambda: run_sweep(plan, points, Workers(jobs)))
 
 
 def asked(config: RackConfig, question: str) -> float:

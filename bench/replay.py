@@ -14,7 +14,7 @@ from automax_ros.compile.native.run.forms import NativeForms, NativeMode
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.parallel.job import Where
+from automax_ros.parallel.job import Workers
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
@@ -123,7 +123,7 @@ def print_side_by_side(bag: Path, form: str, options: ReplayOptions) -> None:
 
     def side_by_side_s(jobs: int) -> float:
         began = time.perf_counter()
-        report = replay_side_by_side(replay, Where(jobs))
+        report = replay_side_by_side(replay, Workers(jobs))
         assert report.identical
         return time.perf_counter() - began
 

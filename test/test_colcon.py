@@ -12,7 +12,7 @@ import pytest
 
 from automax_ros.ros.setup.environment import COLCON_COMMAND
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 IDENTIFYING = {"package.xml", "setup.py", "CMakeLists.txt", "colcon.pkg"}
 """A folder with one of these files is a package to colcon, which then looks no further below it."""
 INTROSPECTION = """
@@ -56,8 +56,9 @@ def test_the_top_of_the_repository_has_no_links():
     assert [path.name for path in ROOT.iterdir() if path.is_symlink()] == []
 
 
-def test_readme_and_program_name_the_same_command():
-    assert re.search(rf"^{COLCON_COMMAND}(?= )", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+def test_page_and_program_name_the_same_command():
+    page = (ROOT / "docs" / "howto" / "workspace.md").read_text(encoding="utf-8")
+    assert re.search(rf"^{COLCON_COMMAND}(?= )", page, re.MULTILINE)
 
 
 def test_colcon_can_read_setup_py_and_shares_every_file():
@@ -107,6 +108,7 @@ def test_a_build_by_colcon_without_messages_stops_with_the_line_to_type(build_fo
         result = python("setup.py", "egg_info", folder=build_folder, COLCON="1", **path)
         assert result.returncode == 1
         assert f"\n  colcon build --base-paths . {ROOT}/msg_defs\n" in result.stderr
+        assert "docs/howto/workspace.md" in result.stderr
         assert "Traceback" not in result.stderr
     assert not list(build_folder.glob("*.egg-info"))
 

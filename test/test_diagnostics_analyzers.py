@@ -11,7 +11,7 @@ from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.driven import driven_plants
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 RACKS = sorted(
     path for path in (*(ROOT / "config").rglob("rack.yaml"), ROOT / "test" / "system" / "racks" / "types" / "rack.yaml")
 )

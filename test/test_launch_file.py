@@ -12,7 +12,7 @@ from automax_ros.rack.base.stop_cause import StopCause
 from automax_ros.rackfile.loader import load
 from automax_ros.ros.setup.arguments import split_arguments
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 FILE = ROOT / "launch" / "rack.launch.py"
 EXAMPLES = sorted((ROOT / "examples").glob("*/*.launch.py"))
 NOT_OPTIONS = {

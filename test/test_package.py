@@ -1,14 +1,12 @@
-"""The package as a whole: one version, its entry points, its rooms and their floors, its compiled messages."""
+"""The package as a whole: one version, its entry points, what it needs, its compiled messages."""
 
 import ast
-import importlib
 import json
 import os
 import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from graphlib import CycleError, TopologicalSorter
 from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,16 +19,11 @@ import automax_ros
 from automax_ros.ros.setup import environment
 from automax_ros.ros.setup.environment import RosUnavailable, wheels_installed
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "automax_ros"
 MESSAGES = sorted(path.stem for path in (ROOT / "msg_defs" / "msg").glob("*.msg"))
 
-# Ground floor first: a room may import itself and those before it.
-ROOMS = [
-    "core", "pieces", "blocks", "logix", "language", "compile", "drive", "running", "tuning", "rack", "wire", "bags",
-    "replay", "sweep", "nodes", "cli",
-]  # fmt: skip
-ROOMS_WITH_ROS = {"nodes", "cli"}
+ROOMS_WITH_ROS = {"ros", "cli"}
 ROS_PACKAGES = {
     "ament_index_python", "automax_msgs", "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "launch",
     "launch_ros", "lifecycle_msgs", "rcl_interfaces", "rclpy", "rosgraph_msgs", "rosidl_parser", "sensor_msgs",
@@ -39,10 +32,6 @@ ROS_PACKAGES = {
 ROSDEP_KEYS = {"lz4": "python3-lz4", "numpy": "python3-numpy", "yaml": "python3-yaml", "zstandard": "python3-zstandard"}
 WITHOUT_KEY = {"automax_ros", "distributed", "librt", "matplotlib", "mcap", "mypy_extensions", "scipy"}
 """Imported, but ours, wanted for pictures, clusters or the check of types only, or without a key of rosdep."""
-
-
-def sources_of(room: str) -> list[Path]:
-    return sorted((PACKAGE / room).rglob("*.py"))
 
 
 def imports_of(path: Path) -> Iterator[tuple[int, str]]:
@@ -102,124 +91,18 @@ def test_ament_index_marker_is_there_and_empty():
     assert (ROOT / "resource" / "automax_ros").read_bytes() == b""
 
 
-def test_rooms_are_told_in_their_order():
-    assert f"\n{', '.join(ROOMS)}.\n" in str(automax_ros.__doc__)
-    house = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    assert re.findall(r"^\| `(\w+)/` \|", house, re.MULTILINE) == ROOMS
-
-
-def test_every_folder_of_the_package_is_a_room():
-    folders = {path.parent.relative_to(PACKAGE).parts[0] for path in PACKAGE.glob("*/**/*.py")}
-    assert folders <= set(ROOMS)
-
-
 def test_every_folder_with_sources_is_a_python_package():
     without = {path.parent for path in PACKAGE.rglob("*.py") if not (path.parent / "__init__.py").exists()}
     assert not without
-
-
-@pytest.mark.parametrize("room", ROOMS)
-def test_room_imports_only_rooms_below_it(room):
-    allowed = set(ROOMS[: ROOMS.index(room) + 1])
-    wrong = []
-    for path in sources_of(room):
-        for line, name in imports_of(path):
-            top, _, rest = name.partition(".")
-            # The package itself, for its __version__, is open to all.
-            if top == "automax_ros" and rest.partition(".")[0] not in {*allowed, "", "__version__"}:
-                wrong.append(f"{path.relative_to(ROOT)}:{line}: {name}")
-    assert not wrong
-
-
-@pytest.mark.parametrize("room", [room for room in ROOMS if room not in ROOMS_WITH_ROS])
-def test_room_without_ros_imports_none(room):
-    wrong = [
-        f"{path.relative_to(ROOT)}:{line}: {name}"
-        for path in sources_of(room)
-        for line, name in imports_of(path)
-        if name.partition(".")[0] in ROS_PACKAGES
-    ]
-    assert not wrong
 
 
 def module_of(path: Path) -> str:
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
-def file_imports() -> dict[str, set[str]]:
-    """Each module of the package with the modules that its file imports, wherever in the file."""
-    modules = {module_of(path): path for path in PACKAGE.rglob("*.py")}
-    graph: dict[str, set[str]] = {}
-    for module, path in modules.items():
-        names = {name for _, name in imports_of(path)}
-        found = {name if name in modules else name.rpartition(".")[0] for name in names}
-        graph[module] = found & set(modules) - {automax_ros.__name__}
-    return graph
-
-
-def test_no_file_of_the_package_has_more_than_400_lines():
-    long = {path.relative_to(ROOT): path.read_text(encoding="utf-8").count("\n") for path in PACKAGE.rglob("*.py")}
-    assert {str(path): lines for path, lines in long.items() if lines > 400} == {}
-
-
-def test_no_file_imports_itself_through_others():
-    """Lazy imports count: a circle of files is one file that was cut in the wrong place."""
-    try:
-        list(TopologicalSorter(file_imports()).static_order())
-    except CycleError as error:
-        pytest.fail(f"a circle of files: {' -> '.join(reversed(error.args[1]))}")
-
-
-def test_syntax_knows_no_program_and_a_program_no_checks():
-    """Inside the language: text to tree, then what a checked task is, then the checks that make one."""
-    language = f"{automax_ros.__name__}.language"
-    order = [f"{language}.syntax", f"{language}.program", f"{language}.checks"]
-
-    def rank(module: str) -> int:
-        return next((rank for rank, part in enumerate(order) if module == part or module.startswith(f"{part}.")), -1)
-
-    wrong = [
-        f"{module} imports {name}"
-        for module, names in file_imports().items()
-        for name in names
-        if 0 <= rank(module) < rank(name)
-    ]
-    assert not wrong
-
-
-def homes_of(room: str) -> dict[str, str]:
-    """The names that a room shows its type checker, each with the module that it comes from."""
-    tree = ast.parse((PACKAGE / room / "__init__.py").read_text(encoding="utf-8"))
-    (block,) = [node for node in tree.body if isinstance(node, ast.If)]
-    return {alias.name: str(node.module) for node in block.body for alias in getattr(node, "names", ())}
-
-
-@pytest.mark.parametrize("room", ROOMS)
-def test_room_has_a_public_face(room):
-    """What a type checker sees is what is there, and no name hides a file of the room."""
-    found = importlib.import_module(f"automax_ros.{room}")
-    homes = homes_of(room)
-    assert found.__doc__
-    assert sorted(found.__all__) == sorted(homes)
-    for name, home in homes.items():
-        assert getattr(found, name) is getattr(importlib.import_module(home), name)
-    assert not {path.stem for path in (PACKAGE / room).iterdir()} & set(found.__all__)
-    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
-        found.nothing  # noqa: B018
-
-
-def test_room_loads_its_files_when_they_are_asked_for():
-    program = (
-        "import sys\n"
-        f"for room in {ROOMS}: __import__('automax_ros.' + room)\n"
-        "print(*sorted(name for name in sys.modules if name.count('.') > 1 and name.startswith('automax_ros')))"
-    )
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert result.stdout.split() == ["automax_ros.core.compiled", "automax_ros.core.face"]
-
-
 def test_library_loads_without_ros():
-    modules = [module_of(path) for room in ROOMS if room not in ROOMS_WITH_ROS for path in sources_of(room)]
+    below = [path for path in sorted(PACKAGE.rglob("*.py")) if path.relative_to(PACKAGE).parts[0] not in ROOMS_WITH_ROS]
+    modules = [module_of(path) for path in below]
     program = (
         "import importlib, sys\n"
         f"for module in {modules}: importlib.import_module(module)\n"

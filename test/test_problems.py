@@ -9,7 +9,7 @@ import pytest
 
 from automax_ros.core.problems import PROBLEMS
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "automax_ros"
 TABLE = PACKAGE / "core" / "problems"
 CODE = re.compile(r"AMX\d{4}")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 WITH_THE_WORDS = {Path(__file__), ROOT / "docs" / "glossary.md"}
 FOLDERS = ("automax_ros", "docs", "config", "tools", "bench", "launch", "test")
 ENDINGS = {".py", ".md", ".txt", ".sh"}

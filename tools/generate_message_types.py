@@ -1,4 +1,4 @@
-"""Writes automax_ros/wire/message_types.json: the definition and hash of every message type that a recording holds.
+"""Writes automax_ros/messages/types/message_types.json: definition and hash of each message type in recordings.
 
 python tools/generate_message_types.py, after a change in msg_defs/. The definitions of the standard types come from the
 ROS 2 installed with this interpreter (or AMENT_PREFIX_PATH), the type hashes (RIHS01) from rosbags.
@@ -12,7 +12,7 @@ from pathlib import Path
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 ROOT = Path(__file__).resolve().parent.parent
-TARGET = ROOT / "automax_ros" / "wire" / "message_types.json"
+TARGET = ROOT / "automax_ros" / "messages" / "types" / "message_types.json"
 OWN = "automax_msgs"
 # Parts of services' answers; no recording holds them.
 SERVED = frozenset({"LoggedError"})

@@ -48,7 +48,7 @@ install() {
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-compile "$@"
 }
 
-# What the messages are built with: a line each of setup.py, which needs setuptools itself.
+# What the messages are built with, a line each. setup.py is read, not run: it needs setuptools, which may not be there yet.
 needed_by_messages() {
     "$venv/bin/python" - <<'END'
 import ast

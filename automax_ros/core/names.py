@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import value_of, wanted
@@ -44,7 +44,7 @@ class Shaped(Protocol):
 V = TypeVar("V", bound=Shaped)
 
 
-class NameFault(Fault):
+class NameFault(UserError):
     """A text names no variable, or no element of one."""
 
 
@@ -159,11 +159,11 @@ def setting(text: str, variables: Mapping[str, W], absent: str) -> tuple[Element
     """
     name, equals, given = text.partition("=")
     if not equals:
-        raise Fault(f"{quoted(text)} is not NAME=VALUE")
+        raise UserError(f"{quoted(text)} is not NAME=VALUE")
     meant = element(name, variables, absent)
     kind, length = meant.variable.type, meant.variable.length
     value = value_of(given.strip(), kind, length)
     if value is None:
         message = f"{quoted(given.strip())} is not a value for {meant.label}, type {kind.word}"
-        raise Fault(message, f"it takes {wanted(kind, length)}")
+        raise UserError(message, f"it takes {wanted(kind, length)}")
     return meant, value

@@ -1,7 +1,4 @@
-"""The five data types of the AutoMax languages (J-3676-5, 2.4.3).
-
-When two values are the same.
-"""
+"""The five data types of the AutoMax languages (J-3676-5, 2.4.3)."""
 
 from __future__ import annotations
 

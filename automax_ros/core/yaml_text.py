@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 
 MAX_DEPTH = 16
@@ -47,7 +47,7 @@ Report = Callable[[Flaw, str, Span, str | None], None]
 """Takes what is wrong: its kind, a message, the place, and a hint or None."""
 
 
-class YamlFault(Fault):
+class YamlFault(UserError):
     """A text cannot be read as data; ``flaw`` is the kind of fault."""
 
     def __init__(self, flaw: Flaw, message: str, hint: str | None = None) -> None:

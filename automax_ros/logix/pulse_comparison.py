@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.declare.instance import Instance
 from automax_ros.blocks.discrete.pulse import PULSE_MULT
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.ticks import DEFAULT_TICK_NS
 from automax_ros.core.types import Value
@@ -20,7 +20,7 @@ DEFAULT_MULTIPLIER = 32768
 MAX_WORD_SIZE = 16
 
 
-class ConversionError(Fault):
+class ConversionError(UserError):
     """A parameter that PULSE_MULT does not take, or one without equivalent in PMUL."""
 
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from automax_ros.parallel.installation import Installation, installation
-from automax_ros.parallel.job import MOST_TRIES, ClusterFault, Done, Piece, PieceFault, death_of, fault_of, result_of
+from automax_ros.parallel.job import MOST_TRIES, ClusterFault, Job, JobResult, PieceFault, death_of, fault_of, result_of
 
 _T = TypeVar("_T")
 CONNECT_S = 10
@@ -135,7 +135,7 @@ def attempt(pickled: bytes, topic: str, wanted: Installation) -> Answer | Refusa
     return answer
 
 
-def _answer(piece: Piece, worker: str) -> Answer:
+def _answer(piece: Job, worker: str) -> Answer:
     """Do a piece; a result that cannot be sent is its fault."""
     done = result_of(piece, worker)
     try:
@@ -157,7 +157,7 @@ _LOGGERS = ("distributed.client", "distributed.core", "distributed.comm", "distr
 
 
 def on_cluster(
-    pieces: Sequence[Piece], scheduler: str, take: Callable[[int, Done], None], should_stop: Callable[[], bool]
+    pieces: Sequence[Job], scheduler: str, take: Callable[[int, JobResult], None], should_stop: Callable[[], bool]
 ) -> None:
     """Do pieces by a cluster; the arguments and the end are those of ``run_pieces``.
 
@@ -179,7 +179,7 @@ def on_cluster(
                     continue
                 result, fault = cluster.outcome(pieces[number], futures[number])
                 del futures[number]  # which lets the cluster forget it
-                take(number, Done(pieces[number], result, fault))
+                take(number, JobResult(pieces[number], result, fault))
         finally:
             cluster.give_up(list(futures.values()))
 
@@ -229,14 +229,14 @@ class _Cluster:
             if found != self._own:
                 raise self._unlike(worker, found)
 
-    def submit(self, piece: Piece, number: int, over: Callable[[int], None]) -> Any:
+    def submit(self, piece: Job, number: int, over: Callable[[int], None]) -> Any:
         """Hand a piece to the cluster; return its future. ``over`` is told its number, in another thread."""
         key = f"automax-{self._run}-{number}"
         future = self._client.submit(attempt, pickle.dumps(piece), key, self._own, key=key, pure=False)
         future.add_done_callback(lambda _: over(number))
         return future
 
-    def outcome(self, piece: Piece, future: Any) -> tuple[object, PieceFault | None]:
+    def outcome(self, piece: Job, future: Any) -> tuple[object, PieceFault | None]:
         """Return what came of a piece that is over: its result, or its fault.
 
         Raises:
@@ -304,7 +304,7 @@ def _other_machine(worker: str, found: Installation, own: Installation) -> str:
     )
 
 
-def _fault(piece: Piece, error: Exception) -> PieceFault:
+def _fault(piece: Job, error: Exception) -> PieceFault:
     """Return the fault of a piece that Dask has not brought to an answer of ours."""
     if type(error).__name__ == "KilledWorker":
         return death_of(piece.name, "its workers have died")

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import printable
 
 MOST_TRIES = 2
@@ -19,7 +19,7 @@ MOST_TRIES = 2
 
 
 @dataclass(frozen=True)
-class Piece:
+class Job:
     """One piece: ``work``, a function of a module, called with ``arguments``; all of it, and the result, is pickled.
 
     ``name`` is what the person is told; it should be unlike that of every other piece.
@@ -50,16 +50,16 @@ class PieceFault:
 
 
 @dataclass(frozen=True)
-class Done:
+class JobResult:
     """A piece that is over: with its result, or with its fault."""
 
-    piece: Piece
+    piece: Job
     result: Any | None = None
     fault: PieceFault | None = None
 
 
 @dataclass(frozen=True)
-class Where:
+class Workers:
     """Where pieces are done: by the cluster of a Dask ``scheduler``, else by ``jobs`` processes of this machine.
 
     ``jobs`` of 1 is this process itself, None as many as there are cores for it.
@@ -99,15 +99,15 @@ def death_of(name: str, what: str, worker: str = "") -> PieceFault:
     return PieceFault(name, "WorkerDied", f"{what}, {MOST_TRIES} times; it is not tried again", worker, died=True)
 
 
-def result_of(piece: Piece, worker: str = "") -> Done:
+def result_of(piece: Job, worker: str = "") -> JobResult:
     """Do a piece here and now."""
     try:
-        return Done(piece, piece.work(*piece.arguments))
+        return JobResult(piece, piece.work(*piece.arguments))
     except Exception as error:
-        return Done(piece, fault=fault_of(piece.name, error, worker))
+        return JobResult(piece, fault=fault_of(piece.name, error, worker))
 
 
-class ClusterFault(Fault):
+class ClusterFault(UserError):
     """Pieces cannot be handed to a cluster: ``place`` is the scheduler's address.
 
     ``code`` is AMX6851 to AMX6854, AMX6857 or AMX6858.

@@ -27,7 +27,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NoReturn, Protocol
 
-from automax_ros.parallel.job import MOST_TRIES, Done, Piece, PieceFault, death_of
+from automax_ros.parallel.job import MOST_TRIES, Job, JobResult, PieceFault, death_of
 from automax_ros.parallel.worker import work
 
 _THREADS = Path("/proc/self/task")
@@ -132,7 +132,7 @@ _POLL_S = 0.1
 
 
 def in_processes(
-    pieces: Sequence[Piece], count: int, take: Callable[[int, Done], None], should_stop: Callable[[], bool]
+    pieces: Sequence[Job], count: int, take: Callable[[int, JobResult], None], should_stop: Callable[[], bool]
 ) -> None:
     """Do pieces by ``count`` processes; the arguments and the end are those of ``run_pieces``."""
     todo = deque((number, 1) for number in range(len(pieces)))
@@ -158,9 +158,9 @@ def in_processes(
 def _take_from(
     workers: dict[Connection, _Worker],
     end: Connection,
-    pieces: Sequence[Piece],
+    pieces: Sequence[Job],
     todo: deque[tuple[int, int]],
-    take: Callable[[int, Done], None],
+    take: Callable[[int, JobResult], None],
 ) -> None:
     """Take what a worker tells, or put another one in the place of one that has died."""
     worker = workers[end]
@@ -175,12 +175,12 @@ def _take_from(
             todo.appendleft((number, tries + 1))
         else:
             piece = pieces[number]
-            take(number, Done(piece, fault=death_of(piece.name, f"its process has died ({_ending(code)})")))
+            take(number, JobResult(piece, fault=death_of(piece.name, f"its process has died ({_ending(code)})")))
         if todo:
             _begin(workers)
         return
     worker.task = None
-    take(number, Done(pieces[number], result, fault))
+    take(number, JobResult(pieces[number], result, fault))
 
 
 def _begin(workers: dict[Connection, _Worker]) -> None:
@@ -198,7 +198,7 @@ class _Worker:
         with other:
             self._process = begin(other, [self.end, *ends])
 
-    def give(self, pieces: Sequence[Piece], number: int, tries: int) -> None:
+    def give(self, pieces: Sequence[Job], number: int, tries: int) -> None:
         """Let it do a piece; one that has died by now is found out when it is listened to."""
         self.task = number, tries
         payload = pickle.dumps(pieces[number])

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from automax_ros.parallel.job import Done, Piece, Where, result_of
+from automax_ros.parallel.job import Job, JobResult, Workers, result_of
 
 
 def run_pieces(
-    pieces: Sequence[Piece],
-    where: Where,
-    on_done: Callable[[Done], None] = lambda _: None,
+    pieces: Sequence[Job],
+    where: Workers,
+    on_done: Callable[[JobResult], None] = lambda _: None,
     should_stop: Callable[[], bool] = lambda: False,
-) -> list[Done]:
+) -> list[JobResult]:
     """Do pieces side by side; return what became of them in their order, each once.
 
     ``on_done`` is told of each as it comes, here, in this thread. An error of a piece's work is the fault of this piece
@@ -26,9 +26,9 @@ def run_pieces(
     """
     if not pieces:
         return []
-    done: dict[int, Done] = {}
+    done: dict[int, JobResult] = {}
 
-    def take(number: int, item: Done) -> None:
+    def take(number: int, item: JobResult) -> None:
         if number not in done:
             done[number] = item
             on_done(item)
@@ -46,7 +46,7 @@ def run_pieces(
     return [done[number] for number in sorted(done)]
 
 
-def _here(pieces: Sequence[Piece], take: Callable[[int, Done], None], should_stop: Callable[[], bool]) -> None:
+def _here(pieces: Sequence[Job], take: Callable[[int, JobResult], None], should_stop: Callable[[], bool]) -> None:
     for number, piece in enumerate(pieces):
         if should_stop():
             return

@@ -20,10 +20,10 @@ from automax_ros.rack.base.observers import Observers, RackObserver
 from automax_ros.rack.base.part import RackPart
 from automax_ros.rack.base.views import backplane_of, view_specs
 from automax_ros.rack.modules.building import build_module
-from automax_ros.rack.modules.module import Module, Parts
-from automax_ros.rack.operate.forces import Force, Forcing
+from automax_ros.rack.modules.module import Module, RackServices
+from automax_ros.rack.operate.forces import Force, ForceTable
 from automax_ros.rack.operate.operations import Operations, begin_memory
-from automax_ros.rack.operate.values import Adjustments
+from automax_ros.rack.operate.values import ValueOperations
 from automax_ros.rack.plants.feeding import PlantFeeds
 from automax_ros.rack.plants.plants import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
@@ -43,7 +43,7 @@ from automax_ros.runtime.scan.channels import Channels
 from automax_ros.runtime.scan.drives import Drives
 from automax_ros.runtime.scan.events import Events
 from automax_ros.runtime.scan.execution import IDEAL, Execution
-from automax_ros.runtime.scan.processor_time import ProcessorTime
+from automax_ros.runtime.scan.processor_time import ModeledExecution
 from automax_ros.runtime.tasks.interrupts import Interrupts
 from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, Task
 from automax_ros.runtime.time.scheduler import Scheduler
@@ -75,7 +75,7 @@ class Rack:
         self.config = config
         self.part = RackPart.of(config, local)
         self.memory = CommonMemory(view_specs(config.variables))
-        self._forcing = Forcing(config, self.memory, lambda: self.tasks)
+        self._forcing = ForceTable(config, self.memory, lambda: self.tasks)
         self.writers: tuple[WriterSpec, ...] = writers_of(config)
         self.scheduler = Scheduler()
         installation = installation or Installation(config, self.part.tasks, native=native)
@@ -104,7 +104,7 @@ class Rack:
             no_event=self._no_event,
             stopwatch=stopwatch,
         )
-        parts = Parts(
+        parts = RackServices(
             memory=self.memory,
             scheduler=self.scheduler,
             backplane=self.backplane,
@@ -133,7 +133,7 @@ class Rack:
             self._forcing,
             elsewhere=self.part.elsewhere(self.memory, self.backplane),
         )
-        self.adjust = Adjustments(
+        self.adjust = ValueOperations(
             config, self.operations, self.memory, self.inputs, self._forcing, self.scheduler, self.observers, self.tune
         )
 
@@ -372,7 +372,7 @@ class Rack:
         self.sampling.begin()
 
     def _execution(self, module: str) -> Execution:
-        return ProcessorTime(self.scheduler, module) if self.config.execution is Timing.MODELED else IDEAL
+        return ModeledExecution(self.scheduler, module) if self.config.execution is Timing.MODELED else IDEAL
 
     def _no_event(self, task: Task) -> None:
         next(item for item in self.scheduled if item.task is task).fault(EVENT_TIMEOUT)

@@ -17,7 +17,7 @@ from automax_ros.rackfile.model.ros_names import namespace
 from automax_ros.rackfile.reading.executive import NEWEST, OLDEST, executive_value
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.rackfile.reading.names import RACK_NAME, is_rack_name
-from automax_ros.rackfile.reading.values import Findings, Section, boolean_value, entries_of, text_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, boolean_value, entries_of, text_value
 from automax_ros.rackfile.sections.commons import SCHEMA as COMMON_SCHEMA
 from automax_ros.rackfile.sections.commons import CommonReader
 from automax_ros.rackfile.sections.feeds import read_feeds
@@ -87,7 +87,7 @@ def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
     They are read to see that they can be, not compiled.
     """
     path = Path(path)
-    findings = Findings()
+    findings = ProblemList()
     source = SourceText(str(path), _text_of(path, findings))
     return _loaded(source, TaskReader(path, allow_outside, findings), path, findings)
 
@@ -97,17 +97,17 @@ def load_stored(source: SourceText, path: Path) -> LoadResult:
 
     ``path`` is what the configuration calls the file. No file is touched.
     """
-    findings = Findings()
+    findings = ProblemList()
     return _loaded(source, TaskReader(None, False, findings), path, findings)
 
 
-def _loaded(source: SourceText, tasks: TaskReader, path: Path, findings: Findings) -> LoadResult:
+def _loaded(source: SourceText, tasks: TaskReader, path: Path, findings: ProblemList) -> LoadResult:
     root = read_yaml(source.text, findings.yaml_flaw) if not findings.errors else None
     config = _RackReader(path, source.text, tasks, findings).read(root) if root is not None else None
     return LoadResult(config if not findings.errors else None, findings.in_order(), source)
 
 
-def _text_of(path: Path, findings: Findings) -> str:
+def _text_of(path: Path, findings: ProblemList) -> str:
     try:
         data = read_bytes(path).removeprefix(codecs.BOM_UTF8)
     except FileFault as fault:
@@ -125,7 +125,7 @@ def _text_of(path: Path, findings: Findings) -> str:
 
 
 class _RackReader:
-    def __init__(self, path: Path, text: str, tasks: TaskReader, findings: Findings) -> None:
+    def __init__(self, path: Path, text: str, tasks: TaskReader, findings: ProblemList) -> None:
         self._path = path
         self._text = text
         self._findings = findings

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.json_schema import Schema
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.yaml_text import Flaw, Node, Scalar, YamlFault, read_yaml, yaml_of
@@ -46,10 +46,10 @@ def plant_number(config: RackConfig, text: str) -> PlantNumber:
     plants = {plant.name: plant for plant in config.plants}
     name = owner.upper()
     if name not in plants:
-        raise Fault(f"the rack has no plant {quoted(owner)}", near_or_listed(name, plants))
+        raise UserError(f"the rack has no plant {quoted(owner)}", near_or_listed(name, plants))
     known = {".".join(keys): (keys, schema) for keys, schema in _numbers({"properties": KEYS}, ())}
     if path not in known:
-        raise Fault(f"plant {name} has no number {quoted(path)}", near_or_listed(path, known, f"{name}."))
+        raise UserError(f"plant {name} has no number {quoted(path)}", near_or_listed(path, known, f"{name}."))
     keys, schema = known[path]
     return PlantNumber(name, keys, schema["minimum"], schema["maximum"], schema["type"] == "integer")
 
@@ -86,7 +86,7 @@ def _with(node: Node | None, keys: tuple[str, ...], value: str, label: str) -> K
         return Scalar(value, True, _NOWHERE)
     entries = node.entries if isinstance(node, Keys) else ()
     if node is not None and not isinstance(node, Keys) and not (isinstance(node, Scalar) and node.is_null):
-        raise Fault(f"{label} cannot vary: the rack file has no key {quoted(keys[0])} there", "write the keys out")
+        raise UserError(f"{label} cannot vary: the rack file has no key {quoted(keys[0])} there", "write the keys out")
     key, *rest = keys
     changed = [(name, _with(item, tuple(rest), value, label) if _means(name, keys) else item) for name, item in entries]
     if not any(_means(name, keys) for name, _ in entries):

@@ -23,7 +23,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.language.program import Program
 from automax_ros.rackfile.checks.tasks import check_tasks
@@ -37,25 +37,25 @@ _LOOP_SLOTS = {"io_cntl_slot": "fires the gates of", "dig_io_slot": "reads the p
 """The inputs of a current minor loop that name modules, with what its task does there."""
 
 
-class NoSuchSeat(Fault):
+class NoSuchSeat(UserError):
     """A text names no module of the rack."""
 
 
 @dataclass(frozen=True)
-class Seat:
+class RackProcess:
     """A process of a distributed rack.
 
     Attributes:
         name: that of its first module, ``common_memory`` for the home.
         slots: of its modules, in order.
-        is_home: whether it holds common memory: it alone publishes the rack's topics and takes what operators want.
+        holds_common_memory: then it alone publishes the rack's topics and takes what operators want.
         modules: the names of its modules, in the order of slots.
         reasons: why its modules share a process, a sentence each; () for a module alone.
     """
 
     name: str
     slots: tuple[int, ...]
-    is_home: bool
+    holds_common_memory: bool
     modules: tuple[str, ...]
     reasons: tuple[str, ...] = ()
 
@@ -65,7 +65,7 @@ class Seat:
         return self.name if self.modules == (self.name,) else f"{self.name} ({' '.join(self.modules)})"
 
 
-def seats_of(config: RackConfig, programs: Iterable[Program] | None = None) -> tuple[Seat, ...]:
+def processes_of(config: RackConfig, programs: Iterable[Program] | None = None) -> tuple[RackProcess, ...]:
     """Return the processes of a distributed rack: the home first, the others in the order of their first slots.
 
     ``programs`` are its tasks without errors; they are checked here where they are not given. A task with errors
@@ -76,10 +76,10 @@ def seats_of(config: RackConfig, programs: Iterable[Program] | None = None) -> t
     bonds = list(_bonds(config, list(programs)))
     groups = _groups([module.slot for module in config.modules], [bond.slots for bond in bonds])
     seats = (_seat(config, slots, bonds) for slots in groups)
-    return tuple(sorted(seats, key=lambda seat: (not seat.is_home, seat.slots)))
+    return tuple(sorted(seats, key=lambda seat: (not seat.holds_common_memory, seat.slots)))
 
 
-def seat_named(seats: Sequence[Seat], text: str) -> Seat:
+def seat_named(seats: Sequence[RackProcess], text: str) -> RackProcess:
     """Return the seat of a module, which is named by its slot or by its name, such as ``3`` or ``processor_3``.
 
     Raises:
@@ -175,14 +175,14 @@ def _groups(slots: Sequence[int], bonds: Iterable[tuple[int, ...]]) -> list[tupl
     return list(dict.fromkeys(tuple(sorted(group[slot])) for slot in slots))
 
 
-def _seat(config: RackConfig, slots: tuple[int, ...], bonds: Iterable[_Bond]) -> Seat:
+def _seat(config: RackConfig, slots: tuple[int, ...], bonds: Iterable[_Bond]) -> RackProcess:
     modules = tuple(module.name for module in config.modules if module.slot in slots)
-    is_home = config.home_slot in slots
+    holds_common_memory = config.common_memory_slot in slots
     reasons = tuple(bond.reason for bond in bonds if bond.slots[0] in slots and len(set(bond.slots)) > 1)
-    return Seat(HOME if is_home else modules[0], slots, is_home, modules, reasons)
+    return RackProcess(HOME if holds_common_memory else modules[0], slots, holds_common_memory, modules, reasons)
 
 
 def part_name(config: RackConfig, slots: Collection[int]) -> str:
     """Return the name of the process that has the modules of some slots; ``slot N`` where the rack has none there."""
-    first = min(slots, default=config.home_slot)
+    first = min(slots, default=config.common_memory_slot)
     return next((module.name for module in config.modules if module.slot == first), f"slot {first}")

@@ -10,9 +10,9 @@ from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rackfile.model.config import MAX_SLOT
 from automax_ros.rackfile.model.module import ModuleConfig
-from automax_ros.rackfile.modules.kind import Arrangement, FoundModule, Standing
+from automax_ros.rackfile.modules.kind import ModuleSection, PlacedModule, RackLayout
 from automax_ros.rackfile.modules.registry import KINDS, NOT_YET, REFUSED, SUPPORTED, module_number, spellings
-from automax_ros.rackfile.reading.values import Entry, Findings, Section, entries_of, text_value, wrong_kind
+from automax_ros.rackfile.reading.values import Entry, ProblemList, Section, entries_of, text_value, wrong_kind
 from automax_ros.rackfile.sections.plants import Plants
 from automax_ros.rackfile.sections.tasks import TaskReader
 
@@ -34,12 +34,12 @@ SCHEMA: Schema = entries(
 class SlotReader:
     """Reads the ``slots`` section."""
 
-    def __init__(self, tasks: TaskReader, findings: Findings, executive: int, plants: Plants) -> None:
+    def __init__(self, tasks: TaskReader, findings: ProblemList, executive: int, plants: Plants) -> None:
         """Take the reader of tasks, which knows the names of the whole rack, and the Executive's version."""
         self._executive, self._plants = executive, plants
         self._tasks = tasks
         self._findings = findings
-        self._standing: dict[int, Standing] = {}
+        self._standing: dict[int, PlacedModule] = {}
         self._places: dict[int, Span] = {}
         self._complete = True
         self.unread: frozenset[int] = frozenset()
@@ -64,7 +64,7 @@ class SlotReader:
                 modules.append(module)
         in_order = tuple(sorted(modules, key=lambda item: item.slot))
         self.unread = frozenset(self._places) - {item.slot for item in modules}
-        rack = Arrangement(list(self._standing.values()), self._complete, span, self._findings, in_order)
+        rack = RackLayout(list(self._standing.values()), self._complete, span, self._findings, in_order)
         for kind in KINDS:
             kind.check_places(rack)
         return in_order
@@ -94,11 +94,11 @@ class SlotReader:
         if model is None:
             return None
         kind = SUPPORTED[model]
-        standing = self._standing[slot] = Standing(slot, model, kind, key.span)
+        standing = self._standing[slot] = PlacedModule(slot, model, kind, key.span)
         section = Section(node.entries, _described(standing), ("module", *kind.options), self._findings)
         where = f"{_described(standing)} in slot {slot}"
         return kind.read(
-            FoundModule(
+            ModuleSection(
                 slot, model, section, where, key.span, self._tasks, self._findings, self._executive, self._plants
             )
         )
@@ -126,5 +126,5 @@ class SlotReader:
         return None
 
 
-def _described(standing: Standing) -> str:
+def _described(standing: PlacedModule) -> str:
     return f"{standing.kind.word} {standing.model}"

@@ -35,9 +35,9 @@ from automax_ros.recordings.read.soundness import require_tasks
 from automax_ros.recordings.read.span import require_scans
 from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.segments import BlockReplay
-from automax_ros.replay.scans.carried_state import Beginning, Carried, digest
+from automax_ros.replay.scans.carried_state import CarriedState, PartStart, digest
 from automax_ros.replay.scans.commons import RecordedCommons
-from automax_ros.replay.scans.compare import Tallies
+from automax_ros.replay.scans.compare import DifferenceCounts
 from automax_ros.replay.scans.report import ReplayReport
 from automax_ros.replay.scans.stored_rack import ReplaySource, StoredRack, stored_rack
 from automax_ros.replay.scans.task import TaskReplay
@@ -223,7 +223,7 @@ class Run:
         self._start = facts.table.stamp
         self._commons = RecordedCommons(bag, facts, rack.config)
         self._all_tasks = frozenset(rack.task_names)
-        self._tallies = Tallies(self._start, options.max_differences)
+        self._tallies = DifferenceCounts(self._start, options.max_differences)
         self._begin = self._start + options.from_ns
         self._end = None if options.to_ns is None else self._start + options.to_ns
         self.starts = starts
@@ -304,14 +304,14 @@ class Run:
         found = self._tallies
         return Totals(self._first_stamp, self._last_stamp, tasks, found.first(), found.differences(), found.more)
 
-    def carried(self) -> Carried:
+    def carried(self) -> CarriedState:
         """Return what of all that it has taken decides on what is to come."""
         tasks = {name: task.carried for name, task in self._tasks.items()}
         stopped = frozenset(name for name, task in self._tasks.items() if task.stopped)
-        return Carried(digest((self._commons.carried, tasks)), stopped, self._commons.knows_no_force)
+        return CarriedState(digest((self._commons.carried, tasks)), stopped, self._commons.knows_no_force)
 
     @property
-    def beginnings(self) -> dict[str, Beginning]:
+    def beginnings(self) -> dict[str, PartStart]:
         """What each task has asked of the time before, by its name."""
         return {name: task.beginning for name, task in self._tasks.items()}
 

@@ -11,7 +11,7 @@ from weakref import WeakValueDictionary
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.replay.engine import Replay, ReplayOptions, Run
-from automax_ros.replay.scans.carried_state import Carried
+from automax_ros.replay.scans.carried_state import CarriedState
 from automax_ros.replay.scans.totals import Totals
 
 _AT_HAND: WeakValueDictionary[bytes, Replay] = WeakValueDictionary()
@@ -37,8 +37,8 @@ class PartResult:
     ``doubtful``: were this the end, an edited task might have ended otherwise than the recorded one.
     """
 
-    entry: Carried
-    exit: Carried
+    entry: CarriedState
+    exit: CarriedState
     totals: Totals
     scanned: frozenset[str]
     went_on: frozenset[str]
@@ -93,7 +93,7 @@ def replay_part(what: bytes, part: Part) -> PartResult:
     )
 
 
-def begun(replay: Replay, first: int) -> tuple[Totals, Carried]:
+def begun(replay: Replay, first: int) -> tuple[Totals, CarriedState]:
     """Return what a pass that begins with a file has counted before the first scan, and what it carries there."""
     run = replay.begin({}, replay.options)
     if first:

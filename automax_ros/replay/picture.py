@@ -15,7 +15,7 @@ from automax_ros.core.types import DataType, Value
 from automax_ros.messages.types.messages import Scan
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write
 from automax_ros.recordings.read.common_log import Key
 from automax_ros.replay.engine import Replay
 from automax_ros.replay.scans.commons import UnknownValue
@@ -107,7 +107,7 @@ def draw(found: Sequence[Trace], report: ReplayReport, path: Path) -> None:
         fontsize=10,
     )
     try:
-        with warnings.catch_warnings(), written_whole(path) as place:
+        with warnings.catch_warnings(), atomic_write(path) as place:
             warnings.simplefilter("ignore")  # characters that the font lacks
             figure.savefig(place, dpi=150)
     except OSError as error:

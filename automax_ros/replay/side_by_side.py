@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from automax_ros.parallel.job import Done, Piece, Where
+from automax_ros.parallel.job import Job, JobResult, Workers
 from automax_ros.parallel.run import run_pieces
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.opening import size_of
 from automax_ros.replay.engine import LONGEST_WAIT_NS, Replay
 from automax_ros.replay.part import Part, PartResult, begun, is_unsure, packed, replay_part, scanning
-from automax_ros.replay.scans.carried_state import Carried
+from automax_ros.replay.scans.carried_state import CarriedState
 from automax_ros.replay.scans.report import ReplayReport
 from automax_ros.replay.scans.totals import Totals, added_up
 
@@ -34,7 +34,7 @@ Progress = Callable[[float], None]
 
 
 def replay_side_by_side(
-    replay: Replay, where: Where, on_progress: Progress | None = None, on_note: Callable[[str], None] = lambda _: None
+    replay: Replay, where: Workers, on_progress: Progress | None = None, on_note: Callable[[str], None] = lambda _: None
 ) -> ReplayReport:
     """Replay a recording; its files side by side where there are several, and where that is worth it.
 
@@ -107,7 +107,7 @@ class _Proven:
     knows_no_force: bool = True
     failed: int | None = None
 
-    def follows(self, exit: Carried, result: PartResult) -> bool:
+    def follows(self, exit: CarriedState, result: PartResult) -> bool:
         """Whether a part is what follows on one that has ended so."""
         forces_known = self.knows_no_force or not result.asked_back
         same = exit.content == result.entry.content
@@ -124,13 +124,13 @@ class _SideBySide:
 
     def __init__(self, replay: Replay, parts: list[Part], on_progress: Progress) -> None:
         self._replay, self._parts, self._on_progress = replay, parts, on_progress
-        self._done: dict[str, Done] = {}
+        self._done: dict[str, JobResult] = {}
         self._sizes = [sum(map(size_of, replay.reader.files[part.first : part.end])) for part in parts]
 
-    def run(self, where: Where) -> ReplayReport:
+    def run(self, where: Workers) -> ReplayReport:
         """Execute the parts, put them together, and do in this process what is left."""
         what = packed(self._replay)
-        pieces = [Piece(self._name(number), replay_part, (what, part)) for number, part in enumerate(self._parts)]
+        pieces = [Job(self._name(number), replay_part, (what, part)) for number, part in enumerate(self._parts)]
         run_pieces(pieces, where, self._take, self._is_over)
         results = [result for number in range(len(pieces)) if (result := self._result(number)) is not None]
         self._replay.native_elsewhere = tuple(text for result in results for text in result.native)
@@ -162,7 +162,7 @@ class _SideBySide:
 
     def _proven(self) -> _Proven:
         """Put the parts together as far as each begins where the one before has ended, and nothing differs."""
-        before: tuple[_Proven, Carried] | None = None
+        before: tuple[_Proven, CarriedState] | None = None
         proven = _Proven()
         for number in range(len(self._parts)):
             result = self._result(number)
@@ -184,7 +184,7 @@ class _SideBySide:
         result = done.result if done is not None else None
         return result if isinstance(result, PartResult) else None
 
-    def _take(self, done: Done) -> None:
+    def _take(self, done: JobResult) -> None:
         self._done[done.piece.name] = done
         sizes = sum(size for number, size in enumerate(self._sizes) if self._name(number) in self._done)
         self._on_progress(sizes / sum(self._sizes))
@@ -199,7 +199,7 @@ class _SideBySide:
                 return True
         return False
 
-    def _require_worker(self, piece: Piece) -> None:
+    def _require_worker(self, piece: Job) -> None:
         """Tell if a part has failed that does not fail here: its worker cannot read the recording, or has died.
 
         Raises:

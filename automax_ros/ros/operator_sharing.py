@@ -7,13 +7,13 @@ from functools import partial
 
 from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.node import ModuleNode
-from automax_ros.ros.distributed.bus import RackBus
-from automax_ros.ros.distributed.forwarding import Forwarding, operate_name
+from automax_ros.ros.distributed.bus import DistributedMemory
+from automax_ros.ros.distributed.forwarding import RequestForwarder, operate_name
 from automax_ros.ros.nodes.common_memory import CommonMemoryNode
-from automax_ros.ros.nodes.operator import OperatorDesk, OperatorNode
+from automax_ros.ros.nodes.operator import OperatorNode, OperatorServices
 
 
-def share_operator(nodes: Sequence[ModuleNode], bus: RackBus) -> OperatorDesk | None:
+def forward_operator(nodes: Sequence[ModuleNode], bus: DistributedMemory) -> OperatorServices | None:
     """Let the operator's node pass requests on, or serve what it passes on where that node is elsewhere.
 
     Returns the desk that serves here, to be closed; None where the rack has no operator, or the node closes it.
@@ -22,7 +22,7 @@ def share_operator(nodes: Sequence[ModuleNode], bus: RackBus) -> OperatorDesk | 
     memory = next((node for node in nodes if isinstance(node, CommonMemoryNode)), None)
     for node in nodes:
         if isinstance(node, OperatorNode) and memory is not None:
-            node.desk.forward_by = Forwarding(node, bus, memory.offer_files)
-    if rack.part.is_home or not rack.config.operator:
+            node.desk.forward_by = RequestForwarder(node, bus, memory.offer_files)
+    if rack.part.holds_common_memory or not rack.config.operator:
         return None
-    return OperatorDesk(nodes[0], partial(operate_name, part_name(rack.config, rack.part.slots)))
+    return OperatorServices(nodes[0], partial(operate_name, part_name(rack.config, rack.part.slots)))

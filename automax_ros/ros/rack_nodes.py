@@ -11,11 +11,11 @@ nodes.close()
 One process that is a rack: its nodes in a context and an executor of their own, on the wall clock.
 
 Three threads. The calling one scans, on absolute deadlines (``Pacer``): no ROS timer is in the way (they skip ticks on
-a busy host). A second one takes messages and requests in (``Door``), between two scans. A third one spins the executor,
-which is left with the graph's events. Measured (bench/ros.py): the loop's lateness is the host's own in either form; a
-loop of ``time.sleep`` without ROS oversleeps by 1 to 4 ms as often (the host of a virtual machine takes its processor
-away, with a period of about 0.51 s among others). What a thread of their own gives the scans is that a long message, a
-long conversion or a queue of events does not stand before them.
+a busy host). A second one takes messages and requests in (``MessageIntake``), between two scans. A third one spins the
+executor, which is left with the graph's events. Measured (bench/ros.py): the loop's lateness is the host's own in
+either form; a loop of ``time.sleep`` without ROS oversleeps by 1 to 4 ms as often (the host of a virtual machine takes
+its processor away, with a period of about 0.51 s among others). What a thread of their own gives the scans is that a
+long message, a long conversion or a queue of events does not stand before them.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ from automax_ros.rackfile.loader import load
 from automax_ros.ros.base.clock import RackClock
 from automax_ros.ros.base.lifecycle import ACTIVE, INACTIVE, Pending, TransitionRefused
 from automax_ros.ros.base.module_lifecycle import DEACTIVATED, ManagedModuleNode
-from automax_ros.ros.base.node import SIM_TIME, Site, follows_clock
-from automax_ros.ros.distributed.bus import RackBus, Seating
-from automax_ros.ros.distributed.presence import Herald
+from automax_ros.ros.base.node import SIM_TIME, RackContext, follows_clock
+from automax_ros.ros.distributed.bus import DistributedMemory, ProcessLayout
+from automax_ros.ros.distributed.presence import PresencePublisher
 from automax_ros.ros.intake.guard import MOST_TOLD
-from automax_ros.ros.intake.intake import Door
-from automax_ros.ros.intake.rack_lock import Turns
+from automax_ros.ros.intake.intake import MessageIntake
+from automax_ros.ros.intake.rack_lock import RackLock
 from automax_ros.ros.nodes.operator import OperatorNode
 from automax_ros.ros.nodes.processor import ProcessorNode
-from automax_ros.ros.nodes.rack import Follower, HeldRack, RackNode
+from automax_ros.ros.nodes.rack import Follower, RackLifecycle, RackNode
 from automax_ros.ros.nodes.registry import nodes_of, run_facts
 from automax_ros.ros.nodes.start_parameters import tune_at_start, without_use
-from automax_ros.ros.operator_sharing import share_operator
+from automax_ros.ros.operator_sharing import forward_operator
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments, split_arguments
 from automax_ros.ros.setup.environment import RosUnavailable
 from automax_ros.ros.setup.parameter_files import RosArgumentsError
@@ -75,9 +75,9 @@ class RackNodes:
     """The nodes of one rack, and the rack in them.
 
     ``add_to`` an executor and ``start``, then let it spin; ``start`` with ``paced=False`` and ``run`` scans on the
-    calling thread. Messages and requests come in on a thread of their own (``Door``), whatever the executor does.
-    ``close`` in any case (a ``with`` block does). Whoever touches ``rack`` meanwhile holds ``lock``: scans and messages
-    from outside do, so nothing ever falls into a scan.
+    calling thread. Messages and requests come in on a thread of their own (``MessageIntake``), whatever the executor
+    does. ``close`` in any case (a ``with`` block does). Whoever touches ``rack`` meanwhile holds ``lock``: scans and
+    messages from outside do, so nothing ever falls into a scan.
 
     Attributes:
         rack: the rack.
@@ -95,7 +95,7 @@ class RackNodes:
         context: Context | None = None,
         arguments: RosArguments | None = None,
         manager: RackNode | None = None,
-        seating: Seating | None = None,
+        seating: ProcessLayout | None = None,
         simulated: SimulatedTime | None = None,
     ) -> None:
         """Create the nodes; nothing runs yet.
@@ -124,23 +124,23 @@ class RackNodes:
         self.health = Health() if manager is None else manager.health
         self._executor: Any = None
         self._context = get_default_context() if context is None else context
-        turns = Turns()
+        turns = RackLock()
         follows = follows_clock(arguments, self.rack.config.namespace)
         if follows and seating is not None:
             raise RosArgumentsError(_TOGETHER, "leave out use_sim_time, or run the rack in one process")
         self._clock = RackClock(self.rack.scheduler, turns, follows=follows, simulated=simulated)
         self._pacer = self._clock.pace
-        self._door = Door(self._report)
-        self._site = Site(
+        self._door = MessageIntake(self._report)
+        self._site = RackContext(
             self.rack, self.stream, self._pacer, self._context, self.health, self._door, arguments, lock=turns
         )
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
         self.nodes = nodes_of(self._site)
         self._own: tuple[RackNode, ...] = ()
-        if manager is None and self.rack.part.is_home:
+        if manager is None and self.rack.part.holds_common_memory:
             manager = RackNode(
-                self.rack.config.namespace, self._context, self.health, HeldRack(self), self._enter, arguments
+                self.rack.config.namespace, self._context, self.health, RackLifecycle(self), self._enter, arguments
             )
             manager.served_by(self._door)
             manager.follow(INACTIVE)
@@ -150,10 +150,10 @@ class RackNodes:
         self._to_begin: _Beginning | None = None
         if manager is not None:
             self.rack.observers.add(Follower(manager))
-        self.bus = None if seating is None else RackBus(self._site, self.nodes[0], seating)
+        self.bus = None if seating is None else DistributedMemory(self._site, self.nodes[0], seating)
         if seating is None:
-            Herald(self._site, self.nodes[0])
-        self._desk = None if self.bus is None else share_operator(self.nodes, self.bus)
+            PresencePublisher(self._site, self.nodes[0])
+        self._desk = None if self.bus is None else forward_operator(self.nodes, self.bus)
         self.notes = self._begin_with(arguments)
 
     def _begin_with(self, arguments: RosArguments) -> list[str]:
@@ -174,7 +174,7 @@ class RackNodes:
     @property
     def lock(self) -> AbstractContextManager[None]:
         """What holds off scans and messages: ``with nodes.lock``. The rack's time is the present then."""
-        return self._site.present()
+        return self._site.between_scans()
 
     def add_to(self, executor: Any) -> None:
         """Let an executor of rclpy serve the nodes: any kind, alone or with nodes of your own."""
@@ -218,7 +218,7 @@ class RackNodes:
                 self.rack.start(*beginning)
             else:
                 self._start_together(self.bus, beginning)
-            if self.rack.part.is_home:
+            if self.rack.part.holds_common_memory:
                 self.nodes[0].declare_facts(run_facts(self.stream.run_id))
             for node in (*self._own, *self._managed()):
                 node.follow(ACTIVE)
@@ -238,7 +238,7 @@ class RackNodes:
         if self.bus is not None and operator is not None:
             desk = operator.desk
             return Pending(lambda done: desk.run_everywhere(lambda why: done(TransitionRefused(why) if why else None)))
-        with self._site.present():
+        with self._site.between_scans():
             self.rack.operations.run_all()
         return None
 
@@ -248,7 +248,7 @@ class RackNodes:
         Raises:
             OperationRefused: the power is off.
         """
-        with self._site.present():
+        with self._site.between_scans():
             self.rack.operations.stop_all(DEACTIVATED)
 
     def await_others(self, should_stop: Callable[[], bool]) -> bool:
@@ -266,7 +266,7 @@ class RackNodes:
             time.sleep(LOOK_S)
         return True
 
-    def _start_together(self, bus: RackBus, beginning: _Beginning) -> None:
+    def _start_together(self, bus: DistributedMemory, beginning: _Beginning) -> None:
         """Start at the instant that all processes know, or join those that run already."""
         self._pacer.begin(bus.epoch_ns - time.time_ns())
         self.stream.in_run(bus.run_id)
@@ -339,7 +339,7 @@ class RackNodes:
         return [node for node in self.nodes if isinstance(node, ManagedModuleNode)]
 
     def _enter(self, action: Callable[[], None]) -> None:
-        with self._site.present():
+        with self._site.between_scans():
             action()
 
     def _keep_pace(self) -> None:
@@ -347,7 +347,7 @@ class RackNodes:
             self._clock.wait(lambda: self._closed)
             self._begin()
             while not self._closed:
-                with self._site.lock.scanner:
+                with self._site.lock.for_scan:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
@@ -379,7 +379,7 @@ class LiveRack:
         self,
         rack: Rack,
         arguments: RosArguments = NO_ARGUMENTS,
-        seating: Seating | None = None,
+        seating: ProcessLayout | None = None,
         *,
         process: RosProcess | None = None,
         manager: RackNode | None = None,

@@ -9,7 +9,7 @@ from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.scan.scan_record import ScanRecord
 from automax_ros.runtime.tasks.task import Task
 from automax_ros.scenario.stimuli.reader import RACK_ONLY
-from automax_ros.scenario.stimuli.stage import Happened
+from automax_ros.scenario.stimuli.stage import OperationRecord
 
 
 class OperationLog:
@@ -21,7 +21,7 @@ class OperationLog:
     def __init__(self, is_own: Callable[[], bool]) -> None:
         """Begin with none."""
         self._is_own = is_own
-        self.happened: list[Happened] = []
+        self.happened: list[OperationRecord] = []
 
     def operated(self, operation: Operation) -> None:
         """Keep an operation that a person has asked for."""
@@ -31,7 +31,7 @@ class OperationLog:
         name, assigned, _ = operation.detail.partition(" = ")
         of = name if assigned or not operation.task else operation.task
         why = "" if operation.ok else operation.reason
-        self.happened.append(Happened(operation.at_ns, operation.what, of, operation.ok, why))
+        self.happened.append(OperationRecord(operation.at_ns, operation.what, of, operation.ok, why))
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         """Keep nothing of scans."""

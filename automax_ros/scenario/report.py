@@ -13,7 +13,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.runtime.scan.error_log import ErrorLog, LogEntry
 from automax_ros.runtime.tasks.task import Status
-from automax_ros.scenario.stimuli.stage import Happened
+from automax_ros.scenario.stimuli.stage import OperationRecord
 
 STATUS_WORDS = {
     Status.RUNNING: "running",
@@ -23,7 +23,7 @@ STATUS_WORDS = {
 }
 
 
-def report_of(rack: Rack, happened: Iterable[Happened] = ()) -> dict[str, Any]:
+def report_of(rack: Rack, happened: Iterable[OperationRecord] = ()) -> dict[str, Any]:
     """Return the report of a rack as it is now, with the operations that ``happened``, as data for JSON."""
     return {
         "rack": rack.config.name,
@@ -88,7 +88,7 @@ def _nested(value: Value | Sequence[Value], variable: CommonVariable) -> Any:
     return nested
 
 
-def _operation(item: Happened) -> dict[str, Any]:
+def _operation(item: OperationRecord) -> dict[str, Any]:
     found: dict[str, Any] = {"at": seconds(item.at_ns), "what": item.what, "ok": item.ok}
     if item.of:
         found["of"] = item.of

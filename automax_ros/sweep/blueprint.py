@@ -9,7 +9,7 @@ from pathlib import Path
 
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.problems import Severity
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import Installation
@@ -19,7 +19,7 @@ from automax_ros.rackfile.plant_numbers import PlantNumber, with_numbers
 
 
 @dataclass(frozen=True)
-class Blueprint:
+class RackTemplate:
     """A rack file's text, what the file is called, and the sources of the tasks by name: no file is read again.
 
     ``native`` says which tasks scan as machine code, which changes no result.
@@ -31,7 +31,7 @@ class Blueprint:
     native: NativeForms = IN_PYTHON
 
     @classmethod
-    def of(cls, rack: Rack, native: NativeForms = IN_PYTHON) -> Blueprint:
+    def of(cls, rack: Rack, native: NativeForms = IN_PYTHON) -> RackTemplate:
         """Return that of a rack as it is installed."""
         return cls(rack.config.text, str(rack.config.path), tuple(rack.sources.items()), native)
 
@@ -55,11 +55,11 @@ def _config(text: str, path: str, numbers: tuple[tuple[PlantNumber, str], ...] =
     result = load_stored(SourceText(path, with_numbers(text, dict(numbers))), Path(path))
     if result.config is None:
         first = next(item for item in result.diagnostics if item.severity is Severity.ERROR)
-        raise Fault(first.message, first.hint, code=first.code)
+        raise UserError(first.message, first.hint, code=first.code)
     return result.config
 
 
 @lru_cache(maxsize=1)
-def _installation(blueprint: Blueprint) -> Installation:
+def _installation(blueprint: RackTemplate) -> Installation:
     config = _config(blueprint.text, blueprint.path)
     return Installation(config, sources=dict(blueprint.sources), native=blueprint.native)

@@ -12,7 +12,7 @@ import math
 from bisect import bisect_left
 from typing import Protocol
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_S
 
 MOST_STEPS = 200_000
@@ -216,7 +216,7 @@ def _push(stack: list[tuple[float, int]], value: float, end_ns: int) -> None:
         stack.pop()
     stack.append((value, end_ns))
     if len(stack) > MOST_STEPS:
-        raise Fault(
+        raise UserError(
             f"a measure without a target would have to keep more than {MOST_STEPS} values",
             "give the target: settle(X, 2 %, 1500)",
         )
@@ -271,7 +271,9 @@ class Rise:
             if not records or item > records[-1][0]:
                 records.append((item, begin_ns))
                 if len(records) > MOST_STEPS:
-                    raise Fault(f"rise would have to keep more than {MOST_STEPS} values", "measure a shorter window")
+                    raise UserError(
+                        f"rise would have to keep more than {MOST_STEPS} values", "measure a shorter window"
+                    )
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
         """Return the time between the two levels, each when it is first reached."""

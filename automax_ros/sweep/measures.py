@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.ticks import exact_ns, seconds_text
 from automax_ros.core.types import DataType
@@ -120,13 +120,13 @@ def read_measures(text: str, config: RackConfig, duration_ns: int) -> tuple[Meas
         Fault: it cannot be read, or names what the rack does not have.
     """
     if len(text) > MOST_CHARACTERS:
-        raise Fault(f"{len(text)} characters of measures: at most {MOST_CHARACTERS} are read")
+        raise UserError(f"{len(text)} characters of measures: at most {MOST_CHARACTERS} are read")
     found: list[Measure] = []
     place = 0
     while text[place:].strip(" \t\r\n,"):
         match = _CALL.match(text, place)
         if match is None:
-            raise Fault(f"{quoted(text[place:].strip())} is not a measure", "such as rms(SPEED_ERR%)")
+            raise UserError(f"{quoted(text[place:].strip())} is not a measure", "such as rms(SPEED_ERR%)")
         place = match.end()
         inner = ""
         if match[2]:
@@ -135,9 +135,11 @@ def read_measures(text: str, config: RackConfig, duration_ns: int) -> tuple[Meas
         found.append(_measure(match[1].lower(), inner, config, duration_ns))
     measures = tuple(dict.fromkeys(found))
     if not measures:
-        raise Fault("nothing is measured", f"name measures, such as rms(SPEED_ERR%); there are {', '.join(FUNCTIONS)}")
+        raise UserError(
+            "nothing is measured", f"name measures, such as rms(SPEED_ERR%); there are {', '.join(FUNCTIONS)}"
+        )
     if len(measures) > MOST_MEASURES:
-        raise Fault(f"{len(measures)} measures: a sweep has at most {MOST_MEASURES}")
+        raise UserError(f"{len(measures)} measures: a sweep has at most {MOST_MEASURES}")
     return measures
 
 
@@ -148,31 +150,31 @@ def _closing(text: str, place: int) -> int:
         depth += {"(": 1, ")": -1}.get(text[at], 0)
         if not depth:
             return at
-    raise Fault(f"{quoted(text[place:])}: a ) is missing")
+    raise UserError(f"{quoted(text[place:])}: a ) is missing")
 
 
 def _measure(name: str, inner: str, config: RackConfig, duration_ns: int) -> Measure:
     function = FUNCTIONS.get(name)
     if function is None:
-        raise Fault(f"there is no measure {quoted(name)}", near_or_listed(name, FUNCTIONS))
+        raise UserError(f"there is no measure {quoted(name)}", near_or_listed(name, FUNCTIONS))
     times = _times(name, inner)
     subject, *others = _parts(_TIMES.sub("", inner))
     if not function.least <= len(others) <= function.most:
-        raise Fault(f"{name} cannot have {len(others)} numbers", f"{name}: {function.text}")
+        raise UserError(f"{name} cannot have {len(others)} numbers", f"{name}: {function.text}")
     percent = bool(function.percent and others and others[0].endswith("%"))
     if percent:
         others[0] = others[0].removesuffix("%")
     try:
         numbers = tuple(map(number, others))
     except ValueError as error:
-        raise Fault(f"{name}: {error}", f"{name}: {function.text}") from None
+        raise UserError(f"{name}: {error}", f"{name}: {function.text}") from None
     start_ns, end_ns = times.get("from", 0), times.get("to")
     if times and function.subject in (Subject.TASK, Subject.NOTHING):
-        raise Fault(f"{name} is of the run's end, and takes no from= and to=")
+        raise UserError(f"{name} is of the run's end, and takes no from= and to=")
     if not start_ns < (duration_ns if end_ns is None else end_ns) <= duration_ns:
-        raise Fault(f"{name}: the window is empty, or not within the {seconds_text(duration_ns)} s of a run")
+        raise UserError(f"{name}: the window is empty, or not within the {seconds_text(duration_ns)} s of a run")
     if numbers and function.percent and numbers[0] < 0:
-        raise Fault(f"{name}: a band is not negative")
+        raise UserError(f"{name}: a band is not negative")
     return Measure(name, _subject(function, name, subject, config), numbers, percent, start_ns, end_ns)
 
 
@@ -192,11 +194,11 @@ def _times(name: str, inner: str) -> dict[str, int]:
     found: dict[str, int] = {}
     for key, text in _TIMES.findall(inner):
         if key in found:
-            raise Fault(f"{name} has {key}= twice")
+            raise UserError(f"{name} has {key}= twice")
         try:
             found[key] = exact_ns(text)
         except ValueError as error:
-            raise Fault(f"{name}: {key}={quoted(text, marks='')}: {error}") from None
+            raise UserError(f"{name}: {key}={quoted(text, marks='')}: {error}") from None
     return found
 
 
@@ -204,18 +206,18 @@ def _subject(function: Function, name: str, text: str, config: RackConfig) -> st
     """Return the full name of what a measure is of."""
     if function.subject is Subject.NOTHING:
         if text:
-            raise Fault(f"{name} is of the rack, not of {quoted(text)}", f"write {name}")
+            raise UserError(f"{name} is of the rack, not of {quoted(text)}", f"write {name}")
         return ""
     if not text:
-        raise Fault(f"{name} is of {function.subject.value}, and names none", f"such as {name}(X)")
+        raise UserError(f"{name} is of {function.subject.value}, and names none", f"such as {name}(X)")
     if function.subject is Subject.TASK:
         tasks = [task.name for _, task in config.placed_tasks]
         if text.upper() not in tasks:
-            raise Fault(f"the rack has no task {quoted(text)}", near_or_listed(text.upper(), tasks))
+            raise UserError(f"the rack has no task {quoted(text)}", near_or_listed(text.upper(), tasks))
         return text.upper()
     meant = common_named(config, text)
     if not _fits(meant.variable, function.subject):
-        raise Fault(f"{name} is of {function.subject.value}; {meant.label} is a {meant.variable.type.word}")
+        raise UserError(f"{name} is of {function.subject.value}; {meant.label} is a {meant.variable.type.word}")
     return meant.label
 
 

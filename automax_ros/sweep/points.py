@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of, quoted
 from automax_ros.core.types import Value
 from automax_ros.core.values import number
@@ -55,16 +55,16 @@ def read_varied(rack: Rack, text: str) -> Varied:
     """
     name, equals, given = text.partition("=")
     if not equals or not given.strip():
-        raise Fault(f"{quoted(text)} says no values", _FORM)
+        raise UserError(f"{quoted(text)} says no values", _FORM)
     variable = variable_named(rack, name.strip())
     if not variable.is_number or ":" not in given:
         return Varied(variable, tuple(dict.fromkeys(variable.accepted(item.strip()) for item in given.split(","))))
     parts = given.split(":")
     if len(parts) > 3:
-        raise Fault(f"{quoted(text)} has too many colons", _FORM)
+        raise UserError(f"{quoted(text)} has too many colons", _FORM)
     low, high = (_exact(variable, part) for part in parts[:2])
     if low >= high:
-        raise Fault(f"{variable.quantity.label}: {parts[0]} is not below {parts[1]}", "write the lower end first")
+        raise UserError(f"{variable.quantity.label}: {parts[0]} is not below {parts[1]}", "write the lower end first")
     if len(parts) == 2:
         return Varied(variable, (), low, high)
     return Varied(variable, _between(variable, low, high, _count(variable, parts[2])))
@@ -80,7 +80,9 @@ def grid(varied: Sequence[Varied]) -> list[Point]:
     for item in varied:
         if not item.values:
             label = item.quantity.label
-            raise Fault(f"{label} has two ends and no number of values", f"write {label}=LOW:HIGH:N, or add --sample N")
+            raise UserError(
+                f"{label} has two ends and no number of values", f"write {label}=LOW:HIGH:N, or add --sample N"
+            )
     _check_count(math.prod(len(item.values) for item in varied))
     return list(product(*(item.values for item in varied)))
 
@@ -100,7 +102,7 @@ def sample(varied: Sequence[Varied], count: int, seed: int) -> list[Point]:
         import numpy as np
         from scipy.stats import qmc
     except ImportError as error:
-        raise Fault("--sample needs scipy", "pip install 'automax_ros[sweep]'") from error
+        raise UserError("--sample needs scipy", "pip install 'automax_ros[sweep]'") from error
     shares = qmc.LatinHypercube(d=len(varied), rng=np.random.default_rng(seed)).random(count)
     shares = np.minimum(shares, np.nextafter(1.0, 0.0))  # scipy's lie above 0, and may be 1
     points = (tuple(item.at(share) for item, share in zip(varied, row, strict=True)) for row in shares.tolist())
@@ -109,12 +111,14 @@ def sample(varied: Sequence[Varied], count: int, seed: int) -> list[Point]:
 
 def _check_quantities(varied: Sequence[Varied]) -> None:
     if len(varied) > MOST_QUANTITIES:
-        raise Fault(f"{len(varied)} quantities: a sweep has at most {MOST_QUANTITIES}", "leave some as they are")
+        raise UserError(f"{len(varied)} quantities: a sweep has at most {MOST_QUANTITIES}", "leave some as they are")
 
 
 def _check_count(count: int) -> None:
     if count > MOST_RUNS:
-        raise Fault(f"{count_of(count, 'run')}: a sweep has at most {MOST_RUNS}", "give fewer values, or --sample N")
+        raise UserError(
+            f"{count_of(count, 'run')}: a sweep has at most {MOST_RUNS}", "give fewer values, or --sample N"
+        )
 
 
 def _exact(variable: Variable, text: str) -> Fraction:
@@ -128,9 +132,9 @@ def _count(variable: Variable, text: str) -> int:
     try:
         found = number(text)
     except ValueError as error:
-        raise Fault(f"{label}: {error}", _FORM) from None
+        raise UserError(f"{label}: {error}", _FORM) from None
     if found != int(found) or not 2 <= found <= MOST_RUNS:
-        raise Fault(f"{label}: {quoted(text)} values: a range has 2 to {MOST_RUNS}", _FORM)
+        raise UserError(f"{label}: {quoted(text)} values: a range has 2 to {MOST_RUNS}", _FORM)
     return int(found)
 
 

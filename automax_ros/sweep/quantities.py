@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.names import NameFault
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.types import DataType, Value, bare_name
@@ -125,14 +125,16 @@ def variable_named(rack: Rack, text: str) -> Variable:
         return _tunable(rack, owner, name)
     if owner in plants:
         return _plant(rack, text)
-    raise Fault(f"the rack has no task and no plant {quoted(owner)}", near_or_listed(owner, sorted(tasks | plants), ""))
+    raise UserError(
+        f"the rack has no task and no plant {quoted(owner)}", near_or_listed(owner, sorted(tasks | plants), "")
+    )
 
 
 def _common(rack: Rack, text: str) -> Variable:
     try:
         meant = common_named(rack.config, text)
     except NameFault as fault:
-        raise Fault(fault.message, _tunable_hint(rack, text) or fault.hint) from fault
+        raise UserError(fault.message, _tunable_hint(rack, text) or fault.hint) from fault
     kind = meant.variable.type
 
     def accepted(given: str) -> Value:
@@ -163,14 +165,14 @@ def _tunable(rack: Rack, owner: str, name: str) -> Variable:
     full = wanted if wanted in known else {bare_name(item): item for item in known}.get(wanted)
     if full is None:
         hint = near_or_listed(wanted, known, f"{owner}.") or "it has none"
-        raise Fault(f"task {owner} has no tunable {quoted(wanted)}", hint)
+        raise UserError(f"task {owner} has no tunable {quoted(wanted)}", hint)
 
     def accepted(given: str) -> Value:
         value = tuning({owner: program}, f"{owner}.{full}={given}").value
         try:
             return task.tuning(full, value)
         except ValueError as error:
-            raise Fault(f"{owner}.{error}") from None
+            raise UserError(f"{owner}.{error}") from None
 
     return Variable(VariedTunable(owner, full), accepted, known[full].type is not DataType.REAL)
 
@@ -182,9 +184,9 @@ def _plant(rack: Rack, text: str) -> Variable:
         try:
             value = whole_number(given) if found.is_whole else number(given)
         except ValueError as error:
-            raise Fault(f"{found.label}: {error}") from None
+            raise UserError(f"{found.label}: {error}") from None
         if not found.low <= value <= found.high:
-            raise Fault(f"{found.label} = {value:.10g} lies outside {found.low:.10g} to {found.high:.10g}")
+            raise UserError(f"{found.label} = {value:.10g} lies outside {found.low:.10g} to {found.high:.10g}")
         return value
 
     return Variable(VariedPlant(found), accepted, found.is_whole)

@@ -8,16 +8,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.problems import Severity
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import MOST_BYTES, read_for_rack
-from automax_ros.sweep.blueprint import Blueprint
+from automax_ros.sweep.blueprint import RackTemplate
 from automax_ros.sweep.measures import FUNCTIONS, Measure, Subject
 from automax_ros.sweep.points import Point
 from automax_ros.sweep.quantities import Beginning, Quantity
@@ -49,7 +49,7 @@ class Stimuli:
 class Plan:
     """What all runs of a sweep share."""
 
-    blueprint: Blueprint
+    blueprint: RackTemplate
     quantities: tuple[Quantity, ...]
     measures: tuple[Measure, ...]
     duration_ns: int
@@ -78,7 +78,7 @@ def run_points(plan: Plan, points: Sequence[Point]) -> list[Outcome]:
         Fault: the stimuli file is not the one of the plan.
     """
     if plan.stimuli is not None and _digest(plan.stimuli.path) != plan.stimuli.digest:
-        raise Fault(f"the stimuli file {plan.stimuli.path} is another one on {platform.node()}")
+        raise UserError(f"the stimuli file {plan.stimuli.path} is another one on {platform.node()}")
     return [run_point(plan, point) for point in points]
 
 
@@ -98,7 +98,7 @@ def run_point(
         return _run(plan, plan.beginning(point), attend, should_stop)
     except BagError:
         raise
-    except Fault as fault:
+    except UserError as fault:
         why = fault.message
     except Exception as error:
         why = f"{type(error).__name__}: {error}"
@@ -131,7 +131,7 @@ def _run(
     return Outcome(tuple(values.get(item) for item in plan.measures), fault or refused)
 
 
-def _pass(rack: Rack, plan: Plan, stimulation: Stimulation, should_stop: Callable[[], bool]) -> None:
+def _pass(rack: Rack, plan: Plan, stimulation: StimuliPlayer, should_stop: Callable[[], bool]) -> None:
     """Let the time pass: as `automax run` does, to the end where stimuli may put the rack into RUN again."""
     while rack.now_ns < plan.duration_ns and not should_stop():
         if rack.stop_reason is not None and (plan.stimuli is None or stimulation.is_over):
@@ -142,14 +142,14 @@ def _pass(rack: Rack, plan: Plan, stimulation: Stimulation, should_stop: Callabl
         rack.observers.tell_writes()
 
 
-def _stimulation(rack: Rack, stimuli: Stimuli | None) -> Stimulation:
+def _stimulation(rack: Rack, stimuli: Stimuli | None) -> StimuliPlayer:
     if stimuli is None:
-        return Stimulation((), rack.scheduler)
+        return StimuliPlayer((), rack.scheduler)
     file = read_for_rack(stimuli.path, rack, allow_outside=stimuli.allow_outside)
     if file.stimuli is None:
         first = next(item for item in file.diagnostics if item.severity is Severity.ERROR)
-        raise Fault(f"stimuli: {first.message}", first.hint)
-    return Stimulation(file.stimuli, rack.scheduler)
+        raise UserError(f"stimuli: {first.message}", first.hint)
+    return StimuliPlayer(file.stimuli, rack.scheduler)
 
 
 def _of_rack(rack: Rack, measure: Measure) -> float:
@@ -162,4 +162,4 @@ def _digest(path: Path) -> str:
     try:
         return hashlib.sha256(read_bytes(path, MOST_BYTES)).hexdigest()
     except FileFault as fault:
-        raise Fault(f"the stimuli file {path} {fault}") from fault
+        raise UserError(f"the stimuli file {path} {fault}") from fault

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from automax_ros.parallel.job import Done, Piece, Where
+from automax_ros.parallel.job import Job, JobResult, Workers
 from automax_ros.parallel.run import run_pieces
 from automax_ros.sweep.points import Point
 from automax_ros.sweep.run import Outcome, Plan, run_points
@@ -30,7 +30,7 @@ class Row:
 def run_sweep(
     plan: Plan,
     points: Sequence[Point],
-    where: Where,
+    where: Workers,
     on_rows: Callable[[list[Row]], None] = lambda _: None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> list[Row]:
@@ -45,7 +45,7 @@ def run_sweep(
     pieces = [_piece(plan, points, first, size) for first in range(0, len(points), size)]
     firsts = {piece.name: number * size for number, piece in enumerate(pieces)}
 
-    def rows_of(done: Done) -> list[Row]:
+    def rows_of(done: JobResult) -> list[Row]:
         return list(_rows(done, firsts[done.piece.name]))
 
     if where.scheduler is None:
@@ -54,7 +54,7 @@ def run_sweep(
     return [row for done in found for row in rows_of(done)]
 
 
-def _size(count: int, where: Where) -> int:
+def _size(count: int, where: Workers) -> int:
     """Return how many runs are a piece."""
     if where.scheduler is None and where.processes == 1:
         return 1
@@ -62,13 +62,13 @@ def _size(count: int, where: Where) -> int:
     return max(1, min(_MOST_IN_PIECE, count // pieces))
 
 
-def _piece(plan: Plan, points: Sequence[Point], first: int, size: int) -> Piece:
+def _piece(plan: Plan, points: Sequence[Point], first: int, size: int) -> Job:
     some = tuple(points[first : first + size])
     name = f"run {first + 1}" if len(some) == 1 else f"runs {first + 1} to {first + len(some)}"
-    return Piece(name, run_points, (plan, some))
+    return Job(name, run_points, (plan, some))
 
 
-def _rows(done: Done, first: int) -> Iterable[Row]:
+def _rows(done: JobResult, first: int) -> Iterable[Row]:
     """Return the rows of a piece; where the piece itself has failed, each has its fault."""
     plan, points = done.piece.arguments
     outcomes = done.result

@@ -13,7 +13,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 import numpy as np
 import numpy.typing as npt
 
-from automax_ros.recordings.mcap.whole_file import open_at_once, written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write, open_at_once
 from automax_ros.sweep.run import Plan
 from automax_ros.sweep.sweeping import Row
 
@@ -54,7 +54,7 @@ def write_npz(plan: Plan, rows: Sequence[Row], path: Path) -> None:
     columns["names"] = np.array([item.label for item in plan.quantities], np.str_)
     columns["measures"] = np.array([item.label for item in plan.measures], np.str_)
     with (
-        written_whole(path) as place,
+        atomic_write(path) as place,
         open(place, "wb", opener=open_at_once) as file,
         ZipFile(file, "w") as archive,
     ):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.declare.declaration import Block
 from automax_ros.blocks.declare.dynamics import Dynamics
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
@@ -36,15 +36,15 @@ _LABEL = re.compile(r"0*([0-9]{1,6})(?:\.0*([1-9][0-9]{0,2}))?")
 _LEADING_ZEROS = re.compile(r"(?<=[(,])0+(?=[0-9])")
 
 
-class CallFault(Fault):
+class CallFault(UserError):
     """A dynamic block that cannot be used as it is called."""
 
 
-class NoDynamicBlock(Fault):
+class NoDynamicBlock(UserError):
     """A line that was asked for has no dynamic block."""
 
 
-class ValueFault(Fault):
+class ValueFault(UserError):
     """A value that was given for a variable is for no block."""
 
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from automax_ros.blocks.declare.coefficients import TWO_TO_MINUS_18
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, stored_real
 from automax_ros.core.ticks import MAX_TICK_NS, MAX_TICKS, MIN_TICK_NS, NS_PER_S
 from automax_ros.tuning.tuning import IntegratorRange, Verdict, range_of, verdict_of
@@ -32,7 +32,7 @@ def rate_limits(period_s: float) -> tuple[float, float]:
     return TWO_TO_MINUS_18 * 2.0 * RATE_FACTOR / period_s, 0.9 * math.pi / period_s
 
 
-class RateFault(Fault):
+class RateFault(UserError):
     """A rate that no KI gives."""
 
 

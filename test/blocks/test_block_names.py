@@ -23,9 +23,10 @@ SPEAKS_THE_LANGUAGE = ("language/", "compile/")
 
 def declaring_files():
     """The files of the families, from where the declarations come."""
-    tree = ast.parse((PACKAGE / "blocks" / "families.py").read_text())
+    tree = ast.parse((PACKAGE / "blocks" / "catalogue.py").read_text())
     modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
-    files = {f"blocks/{module.rpartition('.')[2]}.py" for module in modules if module.startswith("automax_ros.blocks.")}
+    names = [module.split(".")[1:] for module in modules if module.startswith("automax_ros.blocks.")]
+    files = {f"{'/'.join(parts)}.py" for parts in names}
     return files | {"blocks/catalogue.py"}
 
 

@@ -12,8 +12,7 @@ from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType
 from automax_ros.drive.current_loop.inputs import INPUTS
 from automax_ros.drive.current_loop.outputs import OUTPUTS
-
-from .support import repeatable
+from blocks.support import repeatable
 
 BLOCK = CATALOGUE["DC_DRIVE_CML"]
 TABLE_1 = """\

@@ -4,8 +4,7 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Form, Platform, Special
 from automax_ros.blocks.declare.instance import Instance, InstanceError
 from automax_ros.core.types import DataType
-
-from .support import TICK
+from blocks.support import TICK
 
 SCAN_LOOP = CATALOGUE["SCAN_LOOP"]
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from .support import Automax
+from cli.support import Automax
 
 
 @pytest.fixture

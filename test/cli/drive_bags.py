@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bags.recordings import RUN
+from recordings.recordings import RUN
 
 from automax_ros.core.kinds import WriteKind, WriterKind
 from automax_ros.core.types import DataType, type_of_name

@@ -14,8 +14,7 @@ from automax_ros.blocks.declare.dynamics import Dynamics, Integrator, corners_at
 from automax_ros.blocks.examples import Example
 from automax_ros.core.numbers import clamp16, round_count
 from automax_ros.core.types import DataType
-
-from .support import columns_of
+from cli.support import columns_of
 
 
 def all_pass_coefficients(period_s, values):

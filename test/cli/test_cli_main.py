@@ -12,8 +12,7 @@ import automax_ros
 import automax_ros.cli.tasks.blocks
 import automax_ros.cli.tasks.check
 from automax_ros.cli.main import BROKEN_PIPE, INTERRUPTED, SUBCOMMANDS, main, module_of
-
-from .support import TASK
+from cli.support import TASK
 
 ROOT = Path(automax_ros.__file__).parent.parent
 

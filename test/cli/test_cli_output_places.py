@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from rack.stimuli.helpers import DRAW, RACK, SPEED
+from scenario.stimuli.helpers import DRAW, RACK, SPEED
 
 NOBODY = "it is a pipe and nobody reads it"
 

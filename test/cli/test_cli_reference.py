@@ -7,8 +7,7 @@ import pytest
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.describe import description, summary, template, templates
 from automax_ros.core.problems import PROBLEMS
-
-from .support import TASK, WRONG
+from cli.support import TASK, WRONG
 
 
 def test_compile_prints_python_functions(automax):

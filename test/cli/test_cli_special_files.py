@@ -5,7 +5,7 @@ import shutil
 import signal
 
 import pytest
-from bags.independent import GOLDEN
+from recordings.independent import GOLDEN
 
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.playback import survey

@@ -11,8 +11,7 @@ import pytest
 from automax_ros.cli.main import SUBCOMMANDS, main
 from automax_ros.cli.visible import VisibleOutput, write_control
 from automax_ros.core.text import visible
-
-from .support import WRONG
+from cli.support import WRONG
 
 EVIL = "ev\x1b]0;il\x07\x9b31m\x7f\u202e\u2028\u2066\rx"
 """ESC, BEL, CSI of C1, DEL, overrides of direction, a line separator, a carriage return."""

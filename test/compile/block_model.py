@@ -8,8 +8,7 @@ from automax_ros.blocks.declare.coefficients import limited
 from automax_ros.blocks.declare.declaration import Access, Block, Special
 from automax_ros.blocks.declare.instance import Instance
 from automax_ros.core.types import DataType, type_of_name
-
-from .support import TICK
+from compile.support import TICK
 
 TICKS = 4
 SUBSCRIPT = 7026

@@ -12,8 +12,7 @@ from automax_ros.core.types import DataType, type_of_name
 from automax_ros.language.program import Program
 from automax_ros.language.tree import tree
 from automax_ros.language.tree.tree import Scope
-
-from .builtin_model import HIGH32, LARGEST, LOW32, Functions, single, whole
+from compile.builtin_model import HIGH32, LARGEST, LOW32, Functions, single, whole
 
 RANGES = {DataType.INTEGER: (-32768, 32767, 7020), DataType.DOUBLE: (LOW32, HIGH32, 7021)}
 

@@ -9,8 +9,7 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
 from automax_ros.language.program import Program
-
-from .support import TICK
+from compile.support import TICK
 
 DECLARATIONS = """10 LOCAL A%, B%, D!, E!, R, Q, X@, Y@, S$, P$:5, T%(10), U!(2,3), V(4), W@(3)
 11 LOCAL F0%, F1%, F2!, FR, G% [CURRENT=3, HIGH=10, LOW=-10], H [CURRENT=1.5, HIGH=9.0, LOW=-9.0]

@@ -16,9 +16,8 @@ from automax_ros.blocks.declare.rules import AtLeast, Contiguous, Needs, NumberT
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, type_of_name
 from automax_ros.runtime.memory.memory import CommonMemory
-
-from .block_model import SIZE, TICKS, Model, ModelBlock, Programmed
-from .support import OTHER, lines, logged, ran, repeatable, run_scans, scan_and_record, task_of
+from compile.block_model import SIZE, TICKS, Model, ModelBlock, Programmed
+from compile.support import OTHER, lines, logged, ran, repeatable, run_scans, scan_and_record, task_of
 
 BLOCKS = [block for block in CATALOGUE.values() if block.step is not None]
 ON_A_RACK = [block for block in BLOCKS if Platform.AUTOMAX in block.runs_on]

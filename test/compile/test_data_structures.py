@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from .support import OTHER, logged, repeatable, run_scans, scan_in_steps, task_of
+from compile.support import OTHER, logged, repeatable, run_scans, scan_in_steps, task_of
 
 NO_SUCH_COLUMN = 7005
 

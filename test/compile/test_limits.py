@@ -11,8 +11,7 @@ from automax_ros.blocks.declare.declaration import HELPERS
 from automax_ros.compile.compiler import compile_program
 from automax_ros.compile.lowering.statements import STATEMENT_LIMIT
 from automax_ros.runtime.tasks.task import Status
-
-from .support import compiled_of, lines, logged, program_of, ran, run_scans, scan_in_steps, task_of, views_of
+from compile.support import compiled_of, lines, logged, program_of, ran, run_scans, scan_in_steps, task_of, views_of
 
 STOP_S = 3.0
 """A scan that never ends is stopped within about a second of processor time."""

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from automax_ros.compile.compiler import compile_program
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.tasks.task import ScanRecord, Task
-
-from .programs import checked, outside_writes, tasks
-from .support import OTHER, WRITER, basic_task_of, repeatable, task_of, views_of
+from compile.programs import checked, outside_writes, tasks
+from compile.support import OTHER, WRITER, basic_task_of, repeatable, task_of, views_of
 
 FLOW = """\
 10 COMMON REF%, SUM!, OUT%

@@ -19,8 +19,7 @@ from automax_ros.language.tree.tree import (
 )
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.tasks.task import Task
-
-from .support import lines, program_of, ran
+from compile.support import lines, program_of, ran
 
 
 def deep_sum(operands: int) -> Binary:

@@ -12,8 +12,7 @@ from automax_ros.compile.base.cost import STATEMENT_ESTIMATES_US, CostModel, Mod
 from automax_ros.compile.scan_times import period_ns, scan_times
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
-
-from .support import TICK, lines, program_of, repeatable, scan_in_steps, task_of
+from compile.support import TICK, lines, program_of, repeatable, scan_in_steps, task_of
 
 SUMMER = "CALL SUMMER(INPUT1=A%, INPUT2=B%, OUTPUT=B%)"
 LAG = "CALL LAG(INPUT=A%, WLG=2.0, OUTPUT=C%)"

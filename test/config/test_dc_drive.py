@@ -10,7 +10,7 @@ import pytest
 from automax_ros.cli.main import main
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
 FOLDER = Path(__file__).parents[2] / "config" / "dc_drive"
@@ -37,7 +37,7 @@ def tour() -> dict[float, dict[str, object]]:
     rack = built()
     read = read_for_rack(FOLDER / "tour.yaml", rack)
     assert read.stimuli is not None
-    played = Stimulation(read.stimuli, rack.scheduler)
+    played = StimuliPlayer(read.stimuli, rack.scheduler)
     rack.start()
     played.begin()
     names = [item.name for item in rack.config.variables if not item.dimensions and not item.name.endswith("$")]

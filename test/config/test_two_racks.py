@@ -8,7 +8,7 @@ from rack.modules.network_racks import Cable
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.loader import load
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
 FOLDER = Path(__file__).parents[2] / "config" / "two_racks"
@@ -73,7 +73,7 @@ def test_neither_starts_without_the_other(line, winder):
 def test_the_winder_alone_with_its_stimuli(winder):
     read = read_for_rack(FOLDER / "winder" / "line.yaml", winder)
     assert read.stimuli is not None
-    played = Stimulation(read.stimuli, winder.scheduler)
+    played = StimuliPlayer(read.stimuli, winder.scheduler)
     winder.start()
     played.begin()
     winder.run(19.9)

@@ -20,7 +20,7 @@ from automax_ros.rackfile.checks.cpu_load import faults, loads_of
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.loader import load
 from automax_ros.recordings.write.recorder import Recorder
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
 FOLDER = Path(__file__).parents[2] / "config" / "web_line"
@@ -43,7 +43,7 @@ def built(folder: Path = FOLDER) -> Rack:
 def begin(rack: Rack, stimuli: str) -> None:
     read = read_for_rack(FOLDER / stimuli, rack)
     assert read.stimuli is not None
-    played = Stimulation(read.stimuli, rack.scheduler)
+    played = StimuliPlayer(read.stimuli, rack.scheduler)
     rack.start()
     played.begin()
 

@@ -92,7 +92,7 @@ def test_with_a_library_that_cannot_be_loaded_the_python_file_runs_and_it_is_tol
     spec = found.find_spec("automax_ros.drive.base.motor")
     motor = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(motor)
-    assert (motor.MOTOR, motor.__file__) == (1, str(package / "drive" / "motor.py"))
+    assert (motor.MOTOR, motor.__file__) == (1, str(package / "drive" / "base" / "motor.py"))
     assert found.find_spec("automax_ros.drive.base.motor") is None
     monkeypatch.setattr(sys, "meta_path", [found])
     (told,) = compiled.describe(str(package))
@@ -163,7 +163,7 @@ def run(program, switch):
 def test_switched_off_everything_is_python():
     program = "from automax_ros.drive.base import motor; print(type(motor.Motor.emf).__name__, motor.__file__)"
     kind, file = run(program, "off").split()
-    assert (kind, Path(file)) == ("function", PACKAGE / "drive" / "motor.py")
+    assert (kind, Path(file)) == ("function", PACKAGE / "drive" / "base" / "motor.py")
 
 
 def test_what_runs_is_told(monkeypatch):

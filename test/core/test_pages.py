@@ -11,8 +11,7 @@ from automax_ros.core.problems import PROBLEMS
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.parse.parser import SOURCE_LIMIT
 from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT
-
-from .problem_pages import PAGES, Fence, read_page
+from core.problem_pages import PAGES, Fence, read_page
 
 COMPILED = [code for code in PROBLEMS if code[3] in "024"]
 """Codes that the compiler reports: their examples are whole tasks."""

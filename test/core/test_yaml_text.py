@@ -1,4 +1,4 @@
-"""YAML as data, bounded; test/rack/test_rack_yaml.py has the places."""
+"""YAML as data, bounded; test/rackfile/reading/test_rack_yaml.py has the places."""
 
 import string
 

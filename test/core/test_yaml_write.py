@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.yaml_text import Mapping, Node, Scalar, Sequence, read_yaml, yaml_of
 
-CONFIGS = sorted((Path(__file__).parent.parent.parent / "config").glob("**/*.yaml"))
+CONFIGS = sorted((Path(__file__).parents[2] / "config").glob("**/*.yaml"))
 HERE = Span(1, 1, 2)
 
 

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.cli.main import main
-
-from .fences import ROOT, Fence, fences
+from docs.fences import ROOT, Fence, fences
 
 STAGES = {
     "docs/old_files.md": "old_files",

@@ -22,9 +22,8 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import KEYS, load
 from automax_ros.rackfile.loader import schema as rack_schema
 from automax_ros.scenario.stimuli.schema import schema as stimuli_schema
-
-from .fences import PAGES, ROOT, Fence, fences
-from .scratch import commands, execute, prepare, session, shows, standing_in, write
+from docs.fences import PAGES, ROOT, Fence, fences
+from docs.scratch import commands, execute, prepare, session, shows, standing_in, write
 
 EXAMPLES = [fence for page in PAGES for fence in fences(page)]
 LANGUAGES = {"python", "yaml", "json", "sh", "console", "blk", "bas", "cnf", "csv", "ebnf", "text", "xml", "cmake"}

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 from system.support import Automax
 
-from .fences import PAGES, ROOT, Fence, fences
-from .scratch import commands, prepare
+from docs.fences import PAGES, ROOT, Fence, fences
+from docs.scratch import commands, prepare
 
 LIVE = [fence for page in PAGES for fence in fences(page) if fence.word("live")]
 RACKS = {

@@ -8,8 +8,7 @@ from automax_ros.drive.base.motor import FixedLoad
 from automax_ros.drive.circuit.ac_line import AcLine
 from automax_ros.drive.circuit.bridge import Bridge
 from automax_ros.drive.circuit.circuit import Circuit
-
-from .switched import LATER, WAYS, Switched
+from drive.switched import LATER, WAYS, Switched
 
 repeatable = settings(deadline=None, derandomize=True, database=None)
 V_LL = 460.0

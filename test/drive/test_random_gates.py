@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .support import circuit_of, currents_at, fire_all, oracle_gates, oracle_of, repeatable
-from .switched import WAYS
+from drive.support import circuit_of, currents_at, fire_all, oracle_gates, oracle_of, repeatable
+from drive.switched import WAYS
 
 NUMBERS = sorted(WAYS)
 

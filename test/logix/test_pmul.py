@@ -7,8 +7,7 @@ import pytest
 
 from automax_ros.logix.pmul import GAIN_ONE, PulseMultiplier
 from automax_ros.logix.updn import UpDownAccumulator
-
-from .support import set_bits
+from logix.support import set_bits
 
 
 def outputs(tag, values):

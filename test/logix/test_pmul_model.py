@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.instance import Instance
 from automax_ros.logix.pmul import PulseMultiplier
-
-from .support import BITS, repeatable, set_bits
+from logix.support import BITS, repeatable, set_bits
 
 dint = st.integers(-(2**31), 2**31 - 1) | st.sampled_from([-(2**31), -1, 0, 1, 2**24, 2**24 + 1, 2**31 - 1])
 int16 = st.integers(-32768, 32767)

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.logix.pulse_comparison import ConversionError, Pair, PulseComparison, PulseParameters
-
-from .support import repeatable
+from logix.support import repeatable
 
 integers = st.integers(-32768, 32767)
 word_sizes = st.integers(0, 16).filter(lambda size: size != 1)

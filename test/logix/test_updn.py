@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.logix.updn import UpDownAccumulator
-
-from .support import repeatable
+from logix.support import repeatable
 
 real = st.floats(width=32, allow_nan=False, allow_infinity=False)
 

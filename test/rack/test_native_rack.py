@@ -10,7 +10,7 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 
-CONFIG = Path(__file__).parent.parent.parent / "config" / "section_drive" / "rack.yaml"
+CONFIG = Path(__file__).parents[2] / "config" / "section_drive" / "rack.yaml"
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bags.live_racks import build
+from recordings.live_racks import build
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.messages.cdr.cdr import encode

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[2]
 HOURS = float(os.environ.get("AUTOMAX_SOAK_HOURS", "24"))
 """Simulated; less of them for a trial. The day is always recorded in 24 files."""
 FILES = 24

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rack.drive_tasks import permit, rack_of
+from rack.drives.drive_tasks import permit, rack_of
 
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.recordings.write.recorder import Recorder

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from bags.live_racks import build
+from recordings.live_racks import build
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriteKind
@@ -18,8 +18,7 @@ from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.replay.engine import ReplayOptions, replay
 from automax_ros.runtime.tasks.task import OVERLAP
-
-from .replays import edited, record, replayed
+from replay.replays import edited, record, replayed
 
 YAML = """\
 rack: LINE1

@@ -9,8 +9,7 @@ import pytest
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.recordings.write.recorder import RecordingOptions
-
-from .replays import SPEED, WORK, busy, edited, recorded, replayed, rewritten
+from replay.replays import SPEED, WORK, busy, edited, recorded, replayed, rewritten
 
 OTHER_SPEED = edited(SPEED, ("CURRENT=1", "CURRENT=2"))
 

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-
-from .replays import record, replayed
+from replay.replays import record, replayed
 
 YAML = """\
 rack: LINE1

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from bags.live_racks import build
+from recordings.live_racks import build
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.stream.stream import RackStream
@@ -14,8 +14,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
-
-from .replays import SPEED, WORK, YAML, busy, edited, recorded, replayed, rewritten
+from replay.replays import SPEED, WORK, YAML, busy, edited, recorded, replayed, rewritten
 
 DOUBLED = edited(WORK, ("COUNT! + 1", "COUNT! + 2"))
 LATER = edited(SPEED, ("110 CALL", "105 CALL"), ("120 CALL", "115 CALL"))

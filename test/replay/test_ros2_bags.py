@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from bags.live_racks import build
-from bags.ros2_bags import JOINED_NS, Sent, recorded_twice, ros2_bag
+from recordings.live_racks import build
+from recordings.ros2_bags import JOINED_NS, Sent, recorded_twice, ros2_bag
 
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.messages.cdr.cdr import encode
@@ -20,9 +20,8 @@ from automax_ros.recordings.tables.scan_table import ScanTable
 from automax_ros.recordings.tables.series import Window
 from automax_ros.recordings.tables.traces import traces
 from automax_ros.replay.engine import replay
-
-from .replays import SPEED, WORK, YAML, busy, edited, rewritten
-from .replays import replayed as replayed_with
+from replay.replays import SPEED, WORK, YAML, busy, edited, rewritten
+from replay.replays import replayed as replayed_with
 
 SETTLED = JOINED_NS + 200 * NS_PER_MS
 """From here on the other recorder has everything."""

@@ -9,11 +9,11 @@ import shutil
 import signal
 
 import pytest
-from pieces.clusters import cluster
+from parallel.clusters import cluster
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.parallel.job import Done, PieceFault, Where, result_of
+from automax_ros.parallel.job import JobResult, PieceFault, Workers, result_of
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.metadata import METADATA_FILE
 from automax_ros.recordings.write.recorder import RecordingOptions
@@ -22,10 +22,9 @@ from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.engine import Replay, ReplayOptions
 from automax_ros.replay.part import Part
 from automax_ros.replay.side_by_side import parts_of, replay_side_by_side
-
-from .replays import SPEED, WORK, YAML, edited, record, recorded, rewritten
-from .test_operated_rack import LISTEN, make, operate
-from .test_operated_rack import WORK as OPERATED_WORK
+from replay.replays import SPEED, WORK, YAML, edited, record, recorded, rewritten
+from replay.test_operated_rack import LISTEN, make, operate
+from replay.test_operated_rack import WORK as OPERATED_WORK
 
 QUARTERS = RecordingOptions(split_ns=NS_PER_S // 4)
 """Eight files of two seconds."""
@@ -90,7 +89,7 @@ def compare(monkeypatch, bag, new=None, **options):
     expected = outcome(lambda: replay.run(None))
     with monkeypatch.context() as patch:
         here = Here(patch)
-        found = outcome(lambda: replay_side_by_side(replay, Where(2)))
+        found = outcome(lambda: replay_side_by_side(replay, Workers(2)))
     assert found == expected
     if not isinstance(found, str):
         assert found.text() == expected.text()
@@ -319,13 +318,13 @@ class Scrambled:
 def test_two_processes_find_the_same(plain):
     replay = prepared(plain)
     shares = []
-    found = replay_side_by_side(replay, Where(2), shares.append)
+    found = replay_side_by_side(replay, Workers(2), shares.append)
     assert replay.native == ["SPEED: in Python: native scans are off"]  # WORK has strings: none of it by columns
     assert found == replay.run(None)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     edit = prepared(plain, EDITS["an operand that matters late"])
-    assert replay_side_by_side(edit, Where(2)) == edit.run(None)
+    assert replay_side_by_side(edit, Workers(2)) == edit.run(None)
 
 
 def test_a_cluster_finds_the_same_though_a_worker_is_killed(plain, tmp_path):
@@ -338,7 +337,7 @@ def test_a_cluster_finds_the_same_though_a_worker_is_killed(plain, tmp_path):
             if not killed:
                 killed.append(found.workers[0].send_signal(signal.SIGKILL))
 
-        assert replay_side_by_side(replay, Where(scheduler=found.address), kill) == replay.run(None)
+        assert replay_side_by_side(replay, Workers(scheduler=found.address), kill) == replay.run(None)
         assert found.workers[0].wait() == -signal.SIGKILL
 
 
@@ -347,7 +346,7 @@ def faulty(fault):
 
     def pieces(wanted, where, on_done, should_stop):
         for number, piece in enumerate(wanted):
-            on_done(Done(piece, fault=fault(piece)) if number == 3 else result_of(piece))
+            on_done(JobResult(piece, fault=fault(piece)) if number == 3 else result_of(piece))
 
     return pieces
 
@@ -357,7 +356,7 @@ def test_files_that_a_worker_cannot_read_are_named_with_the_worker(monkeypatch, 
     fault = faulty(lambda piece: PieceFault(piece.name, "BagError", "cannot be read", "tcp://10.0.0.2:4000"))
     monkeypatch.setattr(side_by_side, "run_pieces", fault)
     with pytest.raises(BagError, match=r"scans_3\.mcap: cannot be read \(on tcp://10\.0\.0\.2:4000\)") as caught:
-        replay_side_by_side(prepared(plain), Where(scheduler="tcp://10.0.0.1:8786"))
+        replay_side_by_side(prepared(plain), Workers(scheduler="tcp://10.0.0.1:8786"))
     assert caught.value.code == "AMX6856"
 
 
@@ -365,7 +364,7 @@ def test_files_whose_workers_die_are_named(monkeypatch, plain):
     fault = faulty(lambda piece: PieceFault(piece.name, "WorkerDied", "its process has died", died=True))
     monkeypatch.setattr(side_by_side, "run_pieces", fault)
     with pytest.raises(BagError, match=r"scans_3\.mcap: its process has died") as caught:
-        replay_side_by_side(prepared(plain), Where(2))
+        replay_side_by_side(prepared(plain), Workers(2))
     assert caught.value.code == "AMX6855"
 
 
@@ -389,8 +388,8 @@ def test_a_cluster_that_is_not_used_is_told(monkeypatch, plain):
     """Nobody is at the address: one part is replayed here, as one job does it, and several are not."""
     monkeypatch.setattr(side_by_side, "LEAST_PART_BYTES", 1 << 30)
     replay, notes = prepared(plain), []
-    nowhere = Where(scheduler="tcp://127.0.0.1:1")
+    nowhere = Workers(scheduler="tcp://127.0.0.1:1")
     assert replay_side_by_side(replay, nowhere, on_note=notes.append) == replay.run(None)
     assert notes == [side_by_side.ONE_PART]
-    assert replay_side_by_side(replay, Where(2), on_note=notes.append) == replay.run(None)
+    assert replay_side_by_side(replay, Workers(2), on_note=notes.append) == replay.run(None)
     assert len(notes) == 1

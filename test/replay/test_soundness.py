@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bags.live_racks import build
-from bags.mutations import CHANGES, mutants
 from mcap.reader import make_reader
 from mcap.writer import Writer as McapWriter
+from recordings.live_racks import build
+from recordings.mutations import CHANGES, mutants
 
 from automax_ros.cli.recordings.bag_info import as_data
 from automax_ros.cli.recordings.bag_info_text import lines_of
@@ -23,8 +23,7 @@ from automax_ros.recordings.write.data_file import StorageOptions
 from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 from automax_ros.replay.engine import replay
 from automax_ros.replay.scans.stored_rack import SourceRefused
-
-from .replays import recorded
+from replay.replays import recorded
 
 WRITES = "automax_msgs/msg/CommonWrite"
 EMPTY_RACK = (

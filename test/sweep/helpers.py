@@ -5,7 +5,7 @@ from pathlib import Path
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from automax_ros.sweep.blueprint import Blueprint
+from automax_ros.sweep.blueprint import RackTemplate
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.points import read_varied
 from automax_ros.sweep.run import Plan, Stimuli
@@ -52,4 +52,4 @@ def plan_of(rack: Rack, varied: list[str], measures: str, seconds: str = "0.2", 
     """A plan for runs of a rack."""
     quantities = tuple(read_varied(rack, text).quantity for text in varied)
     found = read_measures(measures, rack.config, seconds_ns(seconds))
-    return Plan(Blueprint.of(rack), quantities, found, seconds_ns(seconds), stimuli)
+    return Plan(RackTemplate.of(rack), quantities, found, seconds_ns(seconds), stimuli)

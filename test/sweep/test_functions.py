@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.sweep import functions
 from automax_ros.sweep.functions import Accumulator
@@ -126,7 +126,7 @@ def test_what_is_kept_for_an_unknown_target_is_bounded(slope: int, monkeypatch: 
     for accumulator in (functions.Settle(2, percent=True), functions.Rise()):
         for step in range(100):
             accumulator.hold(slope * step * 0.5, step, step + 1)
-        with pytest.raises(Fault, match="more than 100 values"):
+        with pytest.raises(UserError, match="more than 100 values"):
             accumulator.hold(slope * 50.0, 100, 101)
     known = functions.Settle(2, percent=True, target=5)
     for step in range(200):

@@ -6,12 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.sweep.measures import FUNCTIONS, MOST_MEASURES, Measure, Subject, read_measures
-
-from .helpers import rack_in
+from sweep.helpers import rack_in
 
 
 @pytest.fixture(scope="module")
@@ -107,14 +106,14 @@ def test_every_function_makes_what_computes_it(config: RackConfig):
     ],
 )
 def test_what_is_refused(config: RackConfig, text: str, message: str):
-    with pytest.raises(Fault) as caught:
+    with pytest.raises(UserError) as caught:
         read(config, text)
     assert caught.value.message.startswith(message)
 
 
 def test_near_names_are_told(config: RackConfig):
     for text, hint in {"rsm(ERR%)": "did you mean rms?", "rms(ER%)": "did you mean ERR%?"}.items():
-        with pytest.raises(Fault) as caught:
+        with pytest.raises(UserError) as caught:
             read(config, text)
         assert caught.value.hint == hint
 

@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.numbers import stored_real
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.sweep import points
 from automax_ros.sweep.points import grid, read_varied, sample
+from sweep.helpers import rack_in
 
-from .helpers import rack_in
-
-DRIVE = Path(__file__).parent.parent.parent / "config" / "dc_drive" / "rack.yaml"
+DRIVE = Path(__file__).parents[2] / "config" / "dc_drive" / "rack.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -107,26 +106,26 @@ def test_points_that_are_the_same_occur_once(rack: Rack):
     ],
 )
 def test_what_is_refused(rack: Rack, text: str, message: str):
-    with pytest.raises(Fault) as caught:
+    with pytest.raises(UserError) as caught:
         read_varied(rack, text)
     assert caught.value.message == message
 
 
 def test_numbers_of_plants_have_the_limits_of_the_rack_file(drive: Rack):
-    with pytest.raises(Fault, match=r"MOTOR\.inertia = 0 lies outside 1 to 10000"):
+    with pytest.raises(UserError, match=r"MOTOR\.inertia = 0 lies outside 1 to 10000"):
         read_varied(drive, "MOTOR.inertia=0:5:3")
-    with pytest.raises(Fault, match=r"plant MOTOR has no number 'load\.torq'"):
+    with pytest.raises(UserError, match=r"plant MOTOR has no number 'load\.torq'"):
         read_varied(drive, "MOTOR.load.torq=1")
 
 
 def test_a_grid_needs_numbers_of_values_and_is_not_endless(rack: Rack, monkeypatch: pytest.MonkeyPatch):
-    with pytest.raises(Fault, match=r"LOOP\.KP has two ends and no number of values"):
+    with pytest.raises(UserError, match=r"LOOP\.KP has two ends and no number of values"):
         grid([read_varied(rack, "LOOP.KP=0.1:2")])
     monkeypatch.setattr(points, "MOST_RUNS", 99)
     varied = [read_varied(rack, "REF%=1:50:50"), read_varied(rack, "SLOW=1,2")]
-    with pytest.raises(Fault, match="100 runs: a sweep has at most 99"):
+    with pytest.raises(UserError, match="100 runs: a sweep has at most 99"):
         grid(varied)
-    with pytest.raises(Fault, match="100 runs: a sweep has at most 99"):
+    with pytest.raises(UserError, match="100 runs: a sweep has at most 99"):
         sample(varied, 100, 1)
 
 
@@ -135,7 +134,7 @@ def test_not_too_many_quantities_vary(rack: Rack, monkeypatch: pytest.MonkeyPatc
     varied = [read_varied(rack, text) for text in ("REF%=1,2", "LOOP.STEPS=3", "SLOW=1,2")]
     assert len(grid(varied[:2])) == len(sample(varied[:2], 2, 1)) == 2
     for refused in (lambda: grid(varied), lambda: sample(varied, 10, 1)):
-        with pytest.raises(Fault, match="3 quantities: a sweep has at most 2"):
+        with pytest.raises(UserError, match="3 quantities: a sweep has at most 2"):
             refused()
 
 
@@ -147,6 +146,6 @@ def test_a_share_of_one_is_the_last_value(rack: Rack, monkeypatch: pytest.Monkey
 
 
 def test_a_tunable_without_its_task_gets_the_name_that_is_meant(rack):
-    with pytest.raises(Fault) as caught:
+    with pytest.raises(UserError) as caught:
         read_varied(rack, "STEPS=1,2")
     assert caught.value.hint == "a tunable belongs to its task: write LOOP.STEPS"

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.parallel.job import Where
+from automax_ros.parallel.job import Workers
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.sweep.points import grid, read_varied
 from automax_ros.sweep.run import Outcome, Stimuli, run_point, run_points
 from automax_ros.sweep.sweeping import best_rows, run_sweep
+from sweep.helpers import plan_of, rack_in
 
-from .helpers import plan_of, rack_in
-
-DRIVE = Path(__file__).parent.parent.parent / "config" / "dc_drive" / "rack.yaml"
+DRIVE = Path(__file__).parents[2] / "config" / "dc_drive" / "rack.yaml"
 MEASURES = (
     "rms(ERR%) mean(FDBK%, from=0.02) max(ERR%, from=0.0105 to=0.05) settle(FDBK%, 2 %) rise(FDBK%) overshoot(FDBK%)"
     " itae(ERR%) count(NEAR@) time(NEAR@, from=0.0305) final(TABLE%(1)) errors(LOOP) stopped"
@@ -89,9 +88,9 @@ def test_rows_are_the_same_with_more_processes(rack: Rack):
     texts = ["LOOP.KP=0.2:2.4:10", "REF%=500,-800"]
     plan, points = plan_of(rack, texts, MEASURES), points_of(rack, texts)
     told: list[int] = []
-    expected = run_sweep(plan, points, Where(1), lambda rows: told.extend(row.number for row in rows))
+    expected = run_sweep(plan, points, Workers(1), lambda rows: told.extend(row.number for row in rows))
     assert told == [row.number for row in expected] == list(range(1, 21))
-    assert run_sweep(plan, points, Where(2)) == expected
+    assert run_sweep(plan, points, Workers(2)) == expected
 
 
 def faults_of(rack: Rack) -> int:
@@ -104,7 +103,7 @@ def faults_of(rack: Rack) -> int:
 def test_a_run_that_faults_is_a_row(rack: Rack):
     texts = ["RUN@=true,false", "REF%=700,900"]
     plan, points = plan_of(rack, texts, "rms(ERR%) final(FDBK%) errors(LOOP) stopped"), points_of(rack, texts)
-    rows = run_sweep(plan, points, Where(1))
+    rows = run_sweep(plan, points, Workers(1))
     assert [bool(row.outcome.fault) for row in rows] == [False, False, True, True]
     assert rows[2].outcome.measures == (None, None, faults_of(rack), 1)
     assert rows[2].outcome.fault.startswith("task LOOP: ")
@@ -145,7 +144,7 @@ def test_stimuli_happen_in_each_run(rack: Rack, tmp_path: Path):
     assert outcome.fault == ""
     assert outcome.measures == (pytest.approx(500, abs=4), pytest.approx(2000, abs=4), 0, 1)
     path.write_text("- {at: 0.1, set: {REF%: 2001}}\n")
-    (row,) = run_sweep(plan, [(500,)], Where(1))
+    (row,) = run_sweep(plan, [(500,)], Workers(1))
     assert "another one" in row.outcome.fault
 
 

@@ -8,18 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.sweep.blueprint import Blueprint
+from automax_ros.sweep.blueprint import RackTemplate
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.watching import Watch
-
-from .helpers import rack_in
+from sweep.helpers import rack_in
 
 LENGTH_MS = 40
 
 
 @pytest.fixture(scope="module")
-def blueprint(tmp_path_factory: pytest.TempPathFactory) -> Blueprint:
-    return Blueprint.of(rack_in(Path(tmp_path_factory.mktemp("watching"))))
+def blueprint(tmp_path_factory: pytest.TempPathFactory) -> RackTemplate:
+    return RackTemplate.of(rack_in(Path(tmp_path_factory.mktemp("watching"))))
 
 
 WRITES = st.lists(st.tuples(st.integers(0, LENGTH_MS), st.integers(-9, 9)), max_size=30)
@@ -28,7 +27,7 @@ WINDOWS = st.tuples(st.integers(0, LENGTH_MS - 1), st.integers(1, LENGTH_MS)).fi
 
 @given(WRITES, WINDOWS, st.booleans())
 def test_a_window_sees_what_holds_within_it(
-    blueprint: Blueprint, writes: list[tuple[int, int]], window: tuple[int, int], looks: bool
+    blueprint: RackTemplate, writes: list[tuple[int, int]], window: tuple[int, int], looks: bool
 ):
     start, end = window
     times = f"from={start / 1000} to={end / 1000}"

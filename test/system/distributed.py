@@ -18,8 +18,7 @@ from automax_ros.messages.types.messages import NAMES, Presence, Stage
 from automax_ros.messages.types.topics import SCAN, VALUE, QosProfile
 from automax_ros.recordings.live.topics import TopicKind
 from automax_ros.ros.clients.recorder import RawSubscription
-
-from .support import PATIENCE_S, RACKS, Automax, Client, wait_until
+from system.support import PATIENCE_S, RACKS, Automax, Client, wait_until
 
 LINE4 = RACKS / "line4"
 SEATS = ("common_memory", "processor_1", "processor_2", "processor_3", "processor_4", "digital_io_5", "udc_10")

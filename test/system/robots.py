@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from xml.etree import ElementTree
 
-from .support import PATIENCE_S, ROOT
+from system.support import PATIENCE_S, ROOT
 
 EXAMPLES = ROOT / "examples"
 JOINT_FIELDS = {"position", "velocity", "effort"}

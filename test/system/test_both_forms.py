@@ -9,7 +9,7 @@ import pytest
 
 from automax_ros.core import compiled
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 def automax(switch, *arguments):

@@ -11,8 +11,7 @@ import pytest
 
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.replay.engine import ReplayOptions, replay
-
-from .support import COMMAND, PATIENCE_S, RACKS, TYPES, Automax, Client, automax, automax_here, wait_until
+from system.support import COMMAND, PATIENCE_S, RACKS, TYPES, Automax, Client, automax, automax_here, wait_until
 
 OPERATED = RACKS / "operated" / "rack.yaml"
 READY = "Ctrl-C ends the run"

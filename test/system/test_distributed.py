@@ -19,9 +19,8 @@ from automax_ros.messages.types.messages import NAMES, Scan
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.recordings.read.reader import BagReader
-
-from .distributed import RINGS, SEATS, Distributed, Line, copied
-from .support import PATIENCE_S, TYPES, Automax, automax, automax_here, wait_until
+from system.distributed import RINGS, SEATS, Distributed, Line, copied
+from system.support import PATIENCE_S, TYPES, Automax, automax, automax_here, wait_until
 
 TASKS = {"CML", "RING_1", "RING_2", "RING_3", "RING_4", "SPEED", "WIND_A"}
 STOP = "- {at: 3.0, stop: [CML, RING_1, RING_2, RING_3, RING_4, SPEED, WIND_A]}\n"

@@ -10,9 +10,8 @@ import pytest
 
 from automax_ros.recordings.info.info import bag_info
 from automax_ros.replay.engine import replay
-
-from .distributed import Distributed, copied
-from .support import wait_until
+from system.distributed import Distributed, copied
+from system.support import wait_until
 
 TASKS = {"CML", "RING_1", "RING_2", "RING_3", "RING_4", "SPEED", "WIND_A"}
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from .support import PATIENCE_S, ROOT
+from system.support import PATIENCE_S, ROOT
 
 PROGRAM = """
 import sys

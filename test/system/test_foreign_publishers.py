@@ -8,8 +8,7 @@ import pytest
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import CommonWrite, Scan, Values, VariableTable
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import TYPES, Automax, Client, wait_until
+from system.support import TYPES, Automax, Client, wait_until
 
 BEGUN = "recording since"
 READY = "Ctrl-C ends the run"

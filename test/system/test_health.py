@@ -2,7 +2,7 @@
 
 import re
 
-from .support import TYPES, Automax, Client
+from system.support import TYPES, Automax, Client
 
 READY = "Ctrl-C ends the run"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from .support import PATIENCE_S, TYPES, Automax, Client
+from system.support import PATIENCE_S, TYPES, Automax, Client
 
 READY = "Ctrl-C ends the run"
 HOSTILE = Path(__file__).with_name("hostile.py")

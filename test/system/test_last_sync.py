@@ -7,8 +7,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import PATIENCE_S, ROOT, TYPES, Automax
+from system.support import PATIENCE_S, ROOT, TYPES, Automax
 
 READY = "Ctrl-C ends the run"
 REFUSING = """\

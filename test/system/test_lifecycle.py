@@ -5,11 +5,10 @@ import shutil
 import signal
 
 import pytest
-from nodes.managing import ACTIVE, INACTIVE, UNCONFIGURED, Manager
+from ros.managing import ACTIVE, INACTIVE, UNCONFIGURED, Manager
 
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import RACKS, ROOT, TYPES, Automax, Client, automax_here
+from system.support import RACKS, ROOT, TYPES, Automax, Client, automax_here
 
 WAITS = "is unconfigured"
 OPERATED = RACKS / "operated" / "rack.yaml"

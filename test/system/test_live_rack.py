@@ -10,8 +10,7 @@ import pytest
 
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
-
-from .support import TYPES, Automax, Client, consecutive, entries, ns
+from system.support import TYPES, Automax, Client, consecutive, entries, ns
 
 NS_PER_MS = 1_000_000
 PERIODS_NS = {"FAST": 5_500_000, "SLOW": 16_500_000, "COPY": 2_500_000}

@@ -12,8 +12,7 @@ import pytest
 
 from automax_ros.messages.types.messages import NAMES, Scan
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import Automax, Ended, automax_here, wait_until
+from system.support import Automax, Ended, automax_here, wait_until
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
 

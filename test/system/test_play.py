@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bags.recordings import sample_recording
 from mcap.writer import Writer
+from recordings.recordings import sample_recording
 
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import TYPES, Automax, Client, Ended, automax, automax_here, consecutive, ns
+from system.support import TYPES, Automax, Client, Ended, automax, automax_here, consecutive, ns
 
 PLAYING = "Ctrl-C ends it"
 SPAN_NS = 454 * 5_500_000
@@ -262,7 +261,7 @@ def test_recording_of_another_program_plays_as_far_as_its_types_are_installed(ro
 
 
 def test_malformed_message_ends_the_playback(ros_domain_id, tmp_path):
-    from bags.recordings import TABLE
+    from recordings.recordings import TABLE
 
     from automax_ros.messages.cdr.cdr import encode
     from automax_ros.messages.types.messages import NAMES, Int16, VariableTable

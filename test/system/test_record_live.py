@@ -14,8 +14,7 @@ from replay.reexecution import Reexecution
 from automax_ros.core.ticks import NS_PER_S, NS_PER_US
 from automax_ros.recordings.live.topics import GAPS_NAMED
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import TYPES, Automax, Client, automax, automax_here, consecutive, wait_until
+from system.support import TYPES, Automax, Client, automax, automax_here, consecutive, wait_until
 
 READY = "Ctrl-C ends the run"
 BEGUN = "recording since"

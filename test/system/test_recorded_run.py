@@ -9,8 +9,7 @@ from replay.reexecution import Reexecution
 
 from automax_ros.core.values import real_text
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import ROOT, TYPES, automax
+from system.support import ROOT, TYPES, automax
 
 GOLDEN = Path(__file__).parent / "golden" / "types_run.txt"
 SECTION_DRIVE = ROOT / "config" / "section_drive" / "rack.yaml"

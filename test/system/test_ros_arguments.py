@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from .support import TYPES, Automax, automax, automax_here
+from system.support import TYPES, Automax, automax, automax_here
 
 READY = "Ctrl-C ends"
 

@@ -3,8 +3,7 @@
 import signal
 
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import ROOT, Automax, Client
+from system.support import ROOT, Automax, Client
 
 CONFIG = ROOT / "config" / "section_drive" / "rack.yaml"
 

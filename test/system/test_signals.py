@@ -13,10 +13,9 @@ import pytest
 
 from automax_ros.cli.main import main
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import COMMAND, PATIENCE_S, RACKS, ROOT, Automax, catches
-from .test_python_page import IN_ROS
-from .test_stopping import READY, shared_memory
+from system.support import COMMAND, PATIENCE_S, RACKS, ROOT, Automax, catches
+from system.test_python_page import IN_ROS
+from system.test_stopping import READY, shared_memory
 
 OPERATED = RACKS / "operated" / "rack.yaml"
 HORIZON_S = 2.5

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from .support import Automax, Client, automax, automax_here
+from system.support import Automax, Client, automax, automax_here
 
 RACK = """\
 rack: KEEP

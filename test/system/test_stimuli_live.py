@@ -4,9 +4,9 @@ import json
 import signal
 from pathlib import Path
 
-from rack.stimuli.helpers import DRAW, RACK, SPEED
+from scenario.stimuli.helpers import DRAW, RACK, SPEED
 
-from .support import Automax, automax, automax_here
+from system.support import Automax, automax, automax_here
 
 
 def written(folder: Path, stimuli: str) -> tuple[Path, Path, Path]:

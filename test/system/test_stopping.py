@@ -12,8 +12,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from automax_ros.recordings.read.reader import BagReader
-
-from .support import STUCK, TYPES, Automax, Client, automax, automax_here, consecutive, ns, wait_until
+from system.support import STUCK, TYPES, Automax, Client, automax, automax_here, consecutive, ns, wait_until
 
 READY = "Ctrl-C ends the run"
 

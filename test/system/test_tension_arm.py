@@ -6,8 +6,8 @@ import signal
 
 import pytest
 
-from .robots import EXAMPLES, Robot, has_field, module_of, published, shown
-from .support import ROOT, Automax, Client
+from system.robots import EXAMPLES, Robot, has_field, module_of, published, shown
+from system.support import ROOT, Automax, Client
 
 FOLDER = EXAMPLES / "tension_arm"
 CONFIG = ROOT / "config" / "dc_drive" / "rack.yaml"

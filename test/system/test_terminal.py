@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import pytest
 
-from .support import COMMAND, PATIENCE_S, ROOT, TYPES, automax, catches
+from system.support import COMMAND, PATIENCE_S, ROOT, TYPES, automax, catches
 
 COLUMNS = 60
 REDRAW = "\r\x1b[K"

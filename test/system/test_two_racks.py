@@ -2,7 +2,7 @@
 
 import signal
 
-from .support import ROOT, Automax, Client
+from system.support import ROOT, Automax, Client
 
 FOLDER = ROOT / "config" / "two_racks"
 LINE, WINDER = FOLDER / "line" / "rack.yaml", FOLDER / "winder" / "rack.yaml"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.cli.operate.press import add_press_arguments, press_asks
-from automax_ros.cli.operate.requests import Action, Ask, Means
+from automax_ros.cli.operate.requests import Action, Means, ServiceCall
 from automax_ros.cli.operate.text import (
     error_lines,
     fields_of,
@@ -39,16 +39,16 @@ def _add(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _asks(given: argparse.Namespace) -> list[Ask]:
+def _asks(given: argparse.Namespace) -> list[ServiceCall]:
     if not given.node.isidentifier() or not given.node.isascii():
         raise UsageError(f"{quoted(given.node)} is not the name of a node", "such as rack, processor_1, udc_10")
     of = f"{given.transition} {given.node}"
     if given.transition == STATE:
-        return [Ask(f"{given.node}/get_state", "lifecycle_msgs/GetState", of=of)]
+        return [ServiceCall(f"{given.node}/get_state", "lifecycle_msgs/GetState", of=of)]
     from lifecycle_msgs.msg import Transition
 
     wanted = {"transition": Transition(label=given.transition)}
-    return [Ask(f"{given.node}/change_state", "lifecycle_msgs/ChangeState", wanted, of, _reason)]
+    return [ServiceCall(f"{given.node}/change_state", "lifecycle_msgs/ChangeState", wanted, of, _reason)]
 
 
 def _reason(_: str) -> str:
@@ -108,38 +108,40 @@ def _control(name: str, help_text: str) -> Callable[[argparse.ArgumentParser], N
     return add
 
 
-def _moved(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
-    def asks(given: argparse.Namespace) -> list[Ask]:
+def _moved(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
+    def asks(given: argparse.Namespace) -> list[ServiceCall]:
         value = " ".join(given.value) or "true"
         fields = {"name": given.name, "control": given.control, "value": value}
-        return [Ask(service, "automax_msgs/OperateControl", fields, f"{given.name} {given.control} {value}")]
+        return [ServiceCall(service, "automax_msgs/OperateControl", fields, f"{given.name} {given.control} {value}")]
 
     return asks
 
 
-def _each_task(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
-    return lambda given: [Ask(service, "automax_msgs/OperateTask", {"task": name}, name) for name in given.tasks]
+def _each_task(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
+    return lambda given: [
+        ServiceCall(service, "automax_msgs/OperateTask", {"task": name}, name) for name in given.tasks
+    ]
 
 
-def _each_assignment(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
-    def asks(given: argparse.Namespace) -> list[Ask]:
+def _each_assignment(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
+    def asks(given: argparse.Namespace) -> list[ServiceCall]:
         found = []
         for text in given.assignments:
             name, equals, value = text.partition("=")
             if not (name.strip() and equals):
                 raise UsageError(f"{quoted(text)} is not NAME=VALUE")
             fields = {"name": name.strip(), "value": value}
-            found.append(Ask(service, "automax_msgs/SetValue", fields, f"{name.strip()} = {value}"))
+            found.append(ServiceCall(service, "automax_msgs/SetValue", fields, f"{name.strip()} = {value}"))
         return found
 
     return asks
 
 
-def _release(given: argparse.Namespace) -> list[Ask]:
+def _release(given: argparse.Namespace) -> list[ServiceCall]:
     names = [] if _means_all(given.names) else given.names
     if bool(given.names) == given.all:
         raise UsageError("unforce takes names, or --all")
-    return [Ask("unforce", "automax_msgs/Unforce", {"names": names}, " ".join(names) or "all")]
+    return [ServiceCall("unforce", "automax_msgs/Unforce", {"names": names}, " ".join(names) or "all")]
 
 
 def _means_all(names: Sequence[str]) -> bool:
@@ -147,14 +149,14 @@ def _means_all(names: Sequence[str]) -> bool:
     return list(names) == ["all"]
 
 
-def _reload(given: argparse.Namespace) -> list[Ask]:
+def _reload(given: argparse.Namespace) -> list[ServiceCall]:
     try:
         source = read_task_source(given.file)
     except FileFault as fault:
         raise UsageError(f"{given.file} {fault}") from fault
     fields = {"task": given.task, "source": source.text, "keep_state": given.keep_state}
-    worded = _naming_file(given.task.strip().upper(), given.file)
-    return [Ask("reload", "automax_msgs/Reload", fields, f"{given.task} with {given.file}", worded)]
+    reword = _naming_file(given.task.strip().upper(), given.file)
+    return [ServiceCall("reload", "automax_msgs/Reload", fields, f"{given.task} with {given.file}", reword)]
 
 
 def _naming_file(task: str, file: Path) -> Callable[[str], str]:
@@ -163,9 +165,11 @@ def _naming_file(task: str, file: Path) -> Callable[[str], str]:
     return lambda text: sent.sub(lambda _: str(file), text)
 
 
-def _clear(given: argparse.Namespace) -> list[Ask]:
+def _clear(given: argparse.Namespace) -> list[ServiceCall]:
     tasks = [""] if _means_all(given.tasks) or not given.tasks else given.tasks
-    return [Ask("clear_errors", "automax_msgs/OperateTask", {"task": name}, name or "all tasks") for name in tasks]
+    return [
+        ServiceCall("clear_errors", "automax_msgs/OperateTask", {"task": name}, name or "all tasks") for name in tasks
+    ]
 
 
 def _stepped(parser: argparse.ArgumentParser) -> None:
@@ -180,7 +184,7 @@ def _stepped(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _step(given: argparse.Namespace) -> list[Ask]:
+def _step(given: argparse.Namespace) -> list[ServiceCall]:
     if not 1 <= given.count <= _MOST_STEPS:
         raise UsageError(f"--count: {given.count} is not a number from 1 to {_MOST_STEPS}")
     fields: dict[str, Any] = {"what": given.what, "task": given.of, "count": given.count}
@@ -189,7 +193,7 @@ def _step(given: argparse.Namespace) -> list[Ask]:
             fields = {"what": "until", "until_s": seconds_ns(given.of) / NS_PER_S}
         except ValueError as error:
             raise UsageError(f"step until takes a rack time in seconds, not {quoted(given.of)}") from error
-    return [Ask("step", "automax_msgs/Step", fields, " ".join(filter(None, (given.what, given.of))))]
+    return [ServiceCall("step", "automax_msgs/Step", fields, " ".join(filter(None, (given.what, given.of))))]
 
 
 def _powered(parser: argparse.ArgumentParser) -> None:
@@ -201,17 +205,17 @@ def _powered(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--without-battery", action="store_true", help=help_text)
 
 
-def _power(given: argparse.Namespace) -> list[Ask]:
+def _power(given: argparse.Namespace) -> list[ServiceCall]:
     fields = {
         "what": given.what,
         "off_for_s": given.off_for / NS_PER_S if given.what == "cycle" else 0.0,
         "without_battery": given.without_battery,
     }
-    return [Ask("power", "automax_msgs/Power", fields, given.what)]
+    return [ServiceCall("power", "automax_msgs/Power", fields, given.what)]
 
 
-def _one(service: str, type_name: str) -> Callable[[argparse.Namespace], list[Ask]]:
-    return lambda _: [Ask(service, type_name)]
+def _one(service: str, type_name: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
+    return lambda _: [ServiceCall(service, type_name)]
 
 
 def _plant_verbs() -> str:
@@ -242,14 +246,14 @@ ACTIONS: Mapping[str, Action] = {
     "press": Action("hold BOOLEANs at TRUE for a while", press_asks, add_press_arguments, means=Means.PRESS),
     "get": Action(
         "read commons, array elements, variables of tasks",
-        lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names})],
+        lambda given: [ServiceCall("get", "automax_msgs/ReadValues", {"names": given.names})],
         _names,
         values_of,
         value_lines,
     ),
     "watch": Action(
         "read them again and again, and print what has changed",
-        lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names}, " ".join(given.names))],
+        lambda given: [ServiceCall("get", "automax_msgs/ReadValues", {"names": given.names}, " ".join(given.names))],
         add_watch_arguments,
         values_of,
         value_lines,
@@ -270,7 +274,9 @@ ACTIONS: Mapping[str, Action] = {
     "clear": Action("clear error logs, so that faulted tasks can run again", _clear, _some_tasks),
     "errors": Action(
         "the error logs",
-        lambda given: [Ask("errors", "automax_msgs/ReadErrors", {"task": name}) for name in given.tasks or [""]],
+        lambda given: [
+            ServiceCall("errors", "automax_msgs/ReadErrors", {"task": name}) for name in given.tasks or [""]
+        ],
         _some_tasks,
         lambda answer: [fields_of(item) for item in answer.errors],
         error_lines,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from automax_ros.cli.operate.requests import Ask
+from automax_ros.cli.operate.requests import ServiceCall
 from automax_ros.cli.options.values import seconds_above_0
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import quoted
@@ -18,7 +18,7 @@ from automax_ros.core.types import DataType, type_of_name
 DEFAULT_FOR_S = "0.2"
 _LOOK_S = 0.01
 _SET = "automax_msgs/SetValue"
-Answer = Callable[[Ask, int], Any]
+Answer = Callable[[ServiceCall, int], Any]
 """Sends a request, waits for at most a time (ns), and returns the answer."""
 
 
@@ -35,7 +35,7 @@ def add_press_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def press_asks(given: argparse.Namespace) -> list[Ask]:
+def press_asks(given: argparse.Namespace) -> list[ServiceCall]:
     """Return the requests that set all names.
 
     Raises:
@@ -44,18 +44,18 @@ def press_asks(given: argparse.Namespace) -> list[Ask]:
     for name in given.names:
         if type_of_name(name.partition("(")[0].partition("[")[0].strip()) is not DataType.BOOLEAN:
             raise UsageError(f"{quoted(name)} cannot be pressed", "a BOOLEAN can, such as START_PB@; set writes others")
-    return [Ask("set", _SET, {"name": name, "value": "TRUE"}, name) for name in given.names]
+    return [ServiceCall("set", _SET, {"name": name, "value": "TRUE"}, name) for name in given.names]
 
 
 def press(
-    answer: Answer, asks: Sequence[Ask], given: argparse.Namespace, should_stop: Callable[[], bool]
-) -> list[tuple[Ask, Any]]:
+    answer: Answer, asks: Sequence[ServiceCall], given: argparse.Namespace, should_stop: Callable[[], bool]
+) -> list[tuple[ServiceCall, Any]]:
     """Set all names at once, hold them, and put back those that were FALSE; return what became of each.
 
     One that was TRUE already is not pressed: nobody would see an edge, and it is left as it is. Ctrl-C lets go early.
     """
-    pressed: list[tuple[Ask, Any]] = []
-    found: list[tuple[Ask, Any]] = []
+    pressed: list[tuple[ServiceCall, Any]] = []
+    found: list[tuple[ServiceCall, Any]] = []
     try:
         for ask in asks:
             set_to = answer(ask, given.timeout)
@@ -68,7 +68,7 @@ def press(
         _hold(given.held if pressed else 0, should_stop)
     finally:
         for ask, _ in pressed:
-            released = answer(Ask("set", _SET, {"name": ask.of, "value": "FALSE"}, ask.of), given.timeout)
+            released = answer(ServiceCall("set", _SET, {"name": ask.of, "value": "FALSE"}, ask.of), given.timeout)
             if not released.ok:
                 found = [item if item[0] is not ask else (ask, released) for item in found]
     return found

@@ -8,10 +8,10 @@ import sys
 from collections.abc import Iterable
 
 from automax_ros.cli.operate.actions import ACTIONS, add_actions
-from automax_ros.cli.operate.requests import Ask
+from automax_ros.cli.operate.requests import ServiceCall
 from automax_ros.cli.operate.session import Session, connected
 from automax_ros.cli.output.prompt import Interrupt, edit_lines, typed_lines
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 
 _QUIT = ("quit", "exit")
 _HELP = "help"
@@ -36,7 +36,7 @@ def run_shell(arguments: argparse.Namespace) -> int:
     return int(failed and not interactive)
 
 
-_STATUS = Ask("status", "automax_msgs/ReadStatus", {"home_only": True})
+_STATUS = ServiceCall("status", "automax_msgs/ReadStatus", {"home_only": True})
 
 
 class _Shell:
@@ -87,7 +87,7 @@ class _Shell:
             return int(bool(stop.code))
         except Interrupted:
             return 1
-        except Fault as fault:
+        except UserError as fault:
             print(f"automax ctl: {fault}", file=sys.stderr)
             return 2
 
@@ -102,12 +102,12 @@ class _Shell:
         """Return the names of commons and tasks, as far as the rack tells them."""
         wait_ns = self._given.timeout
         asks = [
-            Ask("get", "automax_msgs/ReadValues", {"names": ["*"]}),
-            Ask("tasks", "automax_msgs/ReadTasks"),
+            ServiceCall("get", "automax_msgs/ReadValues", {"names": ["*"]}),
+            ServiceCall("tasks", "automax_msgs/ReadTasks"),
         ]
         try:
             commons, tasks = (self._session.ask(ask, wait_ns) for ask in asks)
-        except Fault:
+        except UserError:
             return []
         found = list(commons.found) if commons is not None else []
         return [*found, *(item.task for item in tasks.tasks)] if tasks is not None else found

@@ -10,17 +10,17 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Ask:
+class ServiceCall:
     """One request: the service, its type as ``package/Type``, the request's fields, and what it is about.
 
-    ``worded`` puts the rack's words into the person's, who knows files of this computer.
+    ``reword`` puts the rack's words into the person's, who knows files of this computer.
     """
 
     service: str
     type_name: str
     fields: Mapping[str, Any] = field(default_factory=dict)
     of: str = ""
-    worded: Callable[[str], str] = str
+    reword: Callable[[str], str] = str
 
 
 class Means(Enum):
@@ -31,7 +31,7 @@ class Means(Enum):
     PRESS = "press"
 
 
-def _done(_: Ask, __: Any) -> str:
+def _done(_: ServiceCall, __: Any) -> str:
     return "done"
 
 
@@ -46,11 +46,11 @@ class Action:
     """
 
     help: str
-    asks: Callable[[argparse.Namespace], list[Ask]]
+    asks: Callable[[argparse.Namespace], list[ServiceCall]]
     add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
     read: Callable[[Any], Any] | None = None
     lines: Callable[[Any], Iterable[str]] = lambda _: ()
-    told: Callable[[Ask, Any], str] = _done
+    told: Callable[[ServiceCall, Any], str] = _done
     means: Means = Means.ONCE
     by_operator: bool = True
     acts: bool = False

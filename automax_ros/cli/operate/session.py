@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from automax_ros.cli.operate.actions import STATE
 from automax_ros.cli.operate.press import press
-from automax_ros.cli.operate.requests import Action, Ask, Means
+from automax_ros.cli.operate.requests import Action, Means, ServiceCall
 from automax_ros.cli.operate.text import ALREADY
 from automax_ros.cli.operate.watch import values_of, watch
 from automax_ros.cli.options.rack_name import space_of
@@ -23,7 +23,7 @@ from automax_ros.core.text import printable
 if TYPE_CHECKING:
     from automax_ros.ros.clients.rack_client import RackClient
 
-Answers = list[tuple[Ask, Any]]
+Answers = list[tuple[ServiceCall, Any]]
 _NOW = ("status", "now", "forced", "powered", "message")
 """Fields in which an answer says what is true now."""
 
@@ -54,7 +54,7 @@ class Session:
         (_print_json if arguments.json else _print)(action, arguments.action, answers)
         return 0 if all(_ok(answer) for _, answer in answers) else 1
 
-    def ask(self, ask: Ask, wait_ns: int) -> Any:
+    def ask(self, ask: ServiceCall, wait_ns: int) -> Any:
         """Return the answer to one request of a rack that only reads; None where it was refused."""
         self._find(wait_ns, alone=False)
         answer = self._answer(ask, wait_ns)
@@ -72,16 +72,16 @@ class Session:
 
         self._client.find(wait_ns)
         if alone:
-            known = self._answer(Ask("status", "automax_msgs/ReadStatus", {"home_only": True}), wait_ns).racks
+            known = self._answer(ServiceCall("status", "automax_msgs/ReadStatus", {"home_only": True}), wait_ns).racks
             self._client.refuse_several(known)
             self._client.find(wait_ns, 0 if known == 1 and is_this_host_alone() else ALONE_NS)
 
-    def _answer(self, ask: Ask, wait_ns: int) -> Any:
+    def _answer(self, ask: ServiceCall, wait_ns: int) -> Any:
         package, _, name = ask.type_name.partition("/")
         kind = getattr(importlib.import_module(f"{package}.srv"), name)
         return self._client.call(kind, ask.service, kind.Request(**ask.fields), wait_ns)
 
-    def _watch(self, ask: Ask, arguments: argparse.Namespace) -> int:
+    def _watch(self, ask: ServiceCall, arguments: argparse.Namespace) -> int:
         from automax_ros.ros.clients.rack_client import Interrupted
 
         def read() -> list[dict[str, str]]:
@@ -123,18 +123,18 @@ def _ok(answer: Any) -> bool:
     return bool(getattr(answer, "ok", getattr(answer, "success", True)))
 
 
-def _reason(ask: Ask, answer: Any) -> str:
-    return ask.worded(getattr(answer, "reason", getattr(answer, "message", "")))
+def _reason(ask: ServiceCall, answer: Any) -> str:
+    return ask.reword(getattr(answer, "reason", getattr(answer, "message", "")))
 
 
-def _complain(what: str, ask: Ask, reason: str) -> None:
+def _complain(what: str, ask: ServiceCall, reason: str) -> None:
     print(f"automax ctl: {printable(' '.join((what, ask.of)).strip())}: refused: {printable(reason)}", file=sys.stderr)
 
 
 def _print(action: Action, what: str, answers: Answers) -> None:
     for ask, answer in answers:
         for text in getattr(answer, "findings", ()):
-            print(ask.worded(text), file=sys.stderr)
+            print(ask.reword(text), file=sys.stderr)
         if not _ok(answer):
             _complain(what, ask, _reason(ask, answer))
         elif action.read is None:
@@ -156,7 +156,7 @@ def _print_json(action: Action, what: str, answers: Answers) -> None:
             entry |= {"already": True} if action.told(ask, answer).startswith(ALREADY) else {}
             entry |= {"lost": text} if (text := getattr(answer, "lost", "")) else {}
         if getattr(answer, "findings", ()):
-            entry["findings"] = [ask.worded(text) for text in answer.findings]
+            entry["findings"] = [ask.reword(text) for text in answer.findings]
         if action.read is not None and ok:
             entry["answer"] = action.read(answer)
         found.append(entry)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from automax_ros.cli.operate.requests import Ask
+from automax_ros.cli.operate.requests import ServiceCall
 from automax_ros.cli.operate.watch import value_line
 from automax_ros.core.text import count_of
 from automax_ros.core.types import type_of_name
@@ -79,25 +79,25 @@ def status_lines(data: Any) -> Iterable[str]:
         yield f"did not answer, and is missing above: {', '.join(data['absent'])}"
 
 
-def message_told(_: Ask, answer: Any) -> str:
+def message_told(_: ServiceCall, answer: Any) -> str:
     """Return what an answer says of an operation that was carried out."""
     told = getattr(answer, "message", "")
     return f"done, {told}" if told else "done"
 
 
-def value_told(ask: Ask, answer: Any) -> str:
+def value_told(ask: ServiceCall, answer: Any) -> str:
     """Return whether a value was given, or was there before."""
     if answer.before and answer.before == answer.now and answer.now == _written(ask):
         return f"{ALREADY} {ask.fields['value'].strip()}"
     return "done"
 
 
-def reload_told(_: Ask, answer: Any) -> str:
+def reload_told(_: ServiceCall, answer: Any) -> str:
     """Return what a reload has taken away."""
     return f"done; {answer.lost}: --keep-state keeps what was tuned" if answer.lost else "done"
 
 
-def _written(ask: Ask) -> str:
+def _written(ask: ServiceCall) -> str:
     """Return the value of a request as a program writes it, "" where it writes none."""
     name, text = "".join(ask.fields["name"].split()).partition("(")[0], ask.fields["value"]
     value = value_of(text.strip(), type_of_name(name.partition("[")[0].upper()))

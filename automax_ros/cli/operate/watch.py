@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from automax_ros.cli.options.values import seconds_above_0
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 
@@ -68,7 +68,9 @@ def values_of(answer: Any) -> list[dict[str, str]]:
     """
     if not len(answer.found) == len(answer.values) == len(answer.shown):
         count = f"{count_of(len(answer.found), 'name')} and {count_of(len(answer.values), 'value')}"
-        raise Fault(f"the rack answers with {count}", "look who else serves its operator's services in this ROS domain")
+        raise UserError(
+            f"the rack answers with {count}", "look who else serves its operator's services in this ROS domain"
+        )
     items = zip(answer.found, answer.values, answer.shown, strict=True)
     return [{"name": name, "value": text} | ({"shown": shown} if shown else {}) for name, text, shown in items]
 

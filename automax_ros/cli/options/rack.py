@@ -11,7 +11,7 @@ from pathlib import Path
 from automax_ros.cli.output.screen import print_diagnostics, tell_warnings
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of
 from automax_ros.core.types import Value, bare_name
 from automax_ros.language.program import Program
@@ -154,7 +154,7 @@ def settings_of(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]
     for text in texts:
         try:
             settings.append(setting(config, text))
-        except Fault as error:
+        except UserError as error:
             raise UsageError(f"--set: {error.message}", _tunable_hint(config, text) or error.hint) from error
     return settings
 
@@ -196,7 +196,7 @@ def split_settings(config: RackConfig, texts: list[str]) -> tuple[list[tuple[str
         if task in programs and name:
             try:
                 tunings.append(tuning(programs, text))
-            except Fault as fault:
+            except UserError as fault:
                 raise UsageError(f"--set: {fault.message}", fault.hint) from fault
         else:
             others.append(text)

@@ -8,7 +8,7 @@ from pathlib import Path
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.rack.rack import Rack
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import StimuliFile, read_for_rack
 from automax_ros.scenario.stimuli.stage import Stimulus
 
@@ -17,7 +17,7 @@ class StimuliRefused(Exception):
     """A stimuli file has errors, which were printed."""
 
 
-def stimulation(rack: Rack, path: Path | None, *, allow_outside: bool) -> Stimulation:
+def stimulation(rack: Rack, path: Path | None, *, allow_outside: bool) -> StimuliPlayer:
     """Return what a file lets happen to a rack, nothing without a file; its warnings are printed.
 
     Raises:
@@ -25,8 +25,8 @@ def stimulation(rack: Rack, path: Path | None, *, allow_outside: bool) -> Stimul
         UsageError: it cannot be read.
     """
     if path is None:
-        return Stimulation((), rack.scheduler)
-    return Stimulation(entries_of(read_for_rack(path, rack, allow_outside=allow_outside)), rack.scheduler)
+        return StimuliPlayer((), rack.scheduler)
+    return StimuliPlayer(entries_of(read_for_rack(path, rack, allow_outside=allow_outside)), rack.scheduler)
 
 
 def entries_of(file: StimuliFile) -> tuple[Stimulus, ...]:

@@ -12,7 +12,7 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.names import setting
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
@@ -200,7 +200,7 @@ def settings_of(program: Program, texts: Sequence[str]) -> dict[str, Value]:
 def _setting(program: Program, text: str) -> tuple[str, Value]:
     try:
         meant, value = setting(text, program.symbols, "the task has no variable")
-    except Fault as fault:
+    except UserError as fault:
         raise UsageError(f"--set: {fault.message}", fault.hint) from fault
     tuning = meant.variable.tuning
     if tuning is not None and not isinstance(value, str) and not isinstance(tuning.low, str):

@@ -10,7 +10,7 @@ from automax_ros.cli.options.values import whole_number
 from automax_ros.cli.usage import UsageError
 from automax_ros.compile.native.run.compiler_process import LIMIT_S
 from automax_ros.compile.native.run.forms import NativeForms, NativeMode, NativeOutcome
-from automax_ros.parallel.job import Where
+from automax_ros.parallel.job import Workers
 
 _AUTO = "auto"
 MOST_JOBS = 1024
@@ -33,7 +33,7 @@ def add_where_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     )
 
 
-def where_of(arguments: argparse.Namespace) -> Where:
+def where_of(arguments: argparse.Namespace) -> Workers:
     """Return where pieces are done.
 
     Raises:
@@ -41,12 +41,12 @@ def where_of(arguments: argparse.Namespace) -> Where:
     """
     jobs, scheduler = arguments.jobs, arguments.scheduler
     if scheduler is None:
-        return Where(None if jobs == _AUTO else jobs)
+        return Workers(None if jobs == _AUTO else jobs)
     if not scheduler.strip():
         raise UsageError("--scheduler needs an address", "for example --scheduler tcp://10.0.0.1:8786")
     if jobs != _AUTO:
         raise UsageError("--jobs and --scheduler exclude each other", "a cluster has as many jobs as its workers")
-    return Where(scheduler=scheduler.strip())
+    return Workers(scheduler=scheduler.strip())
 
 
 def _jobs(text: str) -> int | str:

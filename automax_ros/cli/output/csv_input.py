@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import TypeVar
 
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import printable
 
 MAX_LINE = 1_000_000
@@ -23,7 +23,7 @@ MAX_LINE = 1_000_000
 _Table = TypeVar("_Table", bound="CsvTable")
 
 
-class CsvFault(Fault):
+class CsvFault(UserError):
     """Something is wrong with a table: ``code`` AMX6910 to AMX6916; ``place`` is the file and its line."""
 
 

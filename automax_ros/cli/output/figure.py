@@ -13,7 +13,7 @@ from typing import Any
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import printable
 from automax_ros.core.types import DataType
-from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write
 from automax_ros.recordings.tables.traces import ErrorMark, Line, Role, Traces, thinned
 
 DPI = 120
@@ -108,7 +108,7 @@ def save_picture(picture: bytes, path: Path) -> None:
 @contextmanager
 def _writing(path: Path) -> Iterator[Path]:
     try:
-        with written_whole(path) as place:
+        with atomic_write(path) as place:
             yield place
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from automax_ros.cli.usage import UsageError
-from automax_ros.recordings.mcap.whole_file import held_open, is_direct, open_at_once, written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write, held_open, is_direct, open_at_once
 
 
 @contextmanager
@@ -100,7 +100,7 @@ def write_text(path: Path, text: str) -> None:
         UsageError: it cannot be written.
     """
     try:
-        with written_whole(path) as place, open(place, "w", encoding="utf-8", opener=open_at_once) as stream:
+        with atomic_write(path) as place, open(place, "w", encoding="utf-8", opener=open_at_once) as stream:
             stream.write(text)
     except (OSError, ValueError) as error:
         raise _unwritable(path, error) from error

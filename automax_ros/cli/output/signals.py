@@ -17,7 +17,7 @@ _SIGNALLED = 128
 """Exit code of a command that a signal has ended, less the signal's number: what the shell adds."""
 
 
-class CutShort(BaseException):
+class WorkInterrupted(BaseException):
     """A signal came during work that is not worth its end: not an error, so that nobody takes it for one."""
 
 
@@ -45,14 +45,14 @@ class StopRequest:
 
         def quiet(what: Any) -> None:
             # Raised where nobody can take it, as while an object is deleted, the request is still noted.
-            if not isinstance(what.exc_value, CutShort):
+            if not isinstance(what.exc_value, WorkInterrupted):
                 before(what)
 
         sys.unraisablehook = quiet
         self._cuts = True
         try:
             if self.requested:
-                raise CutShort
+                raise WorkInterrupted
             yield
         finally:
             self._cuts = False
@@ -68,7 +68,7 @@ class StopRequest:
             self.requested, self.number = True, number
         if self._cuts:
             self._cuts = False
-            raise CutShort
+            raise WorkInterrupted
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import Any
 from automax_ros.cli.usage import UsageError
 from automax_ros.drive.circuit.scr import FORWARD, PHASES, REVERSE, phase_of
 from automax_ros.drive.circuit.steady import BridgeCase, Moment, SteadyState, waveforms
-from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write
 
 _COLOURS = ("#c1272d", "#2e7d32", "#1f4e9c")
 
@@ -43,7 +43,7 @@ def plot(case: BridgeCase, state: SteadyState, path: Path) -> None:
         fontsize=10,
     )
     try:
-        with written_whole(path) as place:
+        with atomic_write(path) as place:
             figure.savefig(place, dpi=150)
     except (OSError, ValueError) as error:  # ValueError: a suffix that names no format of pictures
         reason = getattr(error, "strerror", None) or error

@@ -21,7 +21,7 @@ from automax_ros.rackfile.checks.tasks import findings_by_task, with_findings
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.processor import MAX_PROCESSORS
 from automax_ros.rackfile.old_plants.draft import Draft, DraftFault, draft
-from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -79,7 +79,7 @@ def write_rack_file(output: Path, text: str, *, force: bool) -> None:
     """Write the whole file or nothing; without ``force`` never over another that came in between."""
     try:
         if force:
-            with written_whole(output) as path:
+            with atomic_write(output) as path:
                 path.write_text(text, encoding="utf-8")
         else:
             with output.open("x", encoding="utf-8") as stream:

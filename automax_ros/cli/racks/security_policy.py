@@ -20,7 +20,7 @@ from automax_ros.cli.options.ros import add_ros_arguments, prepare_ros, ros_argu
 from automax_ros.cli.usage import UsageError
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.processes import seats_of
+from automax_ros.rackfile.processes import processes_of
 
 if TYPE_CHECKING:
     from automax_ros.ros.security.profiles import Enclave
@@ -80,7 +80,9 @@ def _enclaves(arguments: argparse.Namespace, config: RackConfig) -> Sequence[Enc
 
     ros = ros_arguments(arguments)
     rack = (
-        enclaves_of_seats(config, seats_of(config), ros) if arguments.distributed else (enclave_of_rack(config, ros),)
+        enclaves_of_seats(config, processes_of(config), ros)
+        if arguments.distributed
+        else (enclave_of_rack(config, ros),)
     )
     space = f"/{config.namespace}"
     return (*rack, recorder_of(space, rack), operator_of(space, rack))

@@ -15,9 +15,9 @@ from pathlib import Path
 from automax_ros.cli.options.rack import add_outside_argument, add_set_argument, config_of, print_refused, settings_of
 from automax_ros.cli.options.stimuli import StimuliRefused, stimulation
 from automax_ros.cli.output.prompt import Interrupt, edit_lines, typed_lines
-from automax_ros.cli.racks.step_commands import completions, obey
+from automax_ros.cli.racks.step_commands import completions, execute
 from automax_ros.cli.racks.step_session import Session, place_text
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import printable
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.tasks.installation import RackError
@@ -82,8 +82,8 @@ def _obey_all(session: Session, interrupt: Interrupt) -> bool:
 
 def _obeyed(session: Session, line: str) -> bool:
     try:
-        obey(session, line)
-    except Fault as fault:
+        execute(session, line)
+    except UserError as fault:
         sys.stdout.flush()
         print(f"automax step: {fault}", file=sys.stderr)
         return False

@@ -21,7 +21,7 @@ class Command:
     most: int = 2
 
 
-def obey(session: Session, line: str) -> None:
+def execute(session: Session, line: str) -> None:
     """Carry out a line: a command and its words; an empty line, or one that begins with #, does nothing.
 
     Raises:

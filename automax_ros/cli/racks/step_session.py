@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import near_or_listed, printable, quoted, table
 from automax_ros.core.ticks import seconds_ns, seconds_text
 from automax_ros.core.types import Value
@@ -73,7 +73,7 @@ MOST_STEPS = 1_000_000
 _DEFAULT_GO_NS = 1 << 62
 
 
-class CommandFault(Fault):
+class CommandFault(UserError):
     """A command cannot be carried out as it was typed."""
 
 

@@ -21,20 +21,20 @@ from automax_ros.cli.options.stimuli import StimuliRefused, stimulation
 from automax_ros.cli.options.values import seconds_above_0, whole_number
 from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, tell_native, where_of
 from automax_ros.cli.output.screen import ProgressBar
-from automax_ros.cli.output.signals import CutShort, StopRequest, stop_signals
+from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
 from automax_ros.cli.racks.sweep_output import Output, Wanted, best_of, prepared, print_best
 from automax_ros.cli.run.plan import warn
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.parallel.job import Where
+from automax_ros.parallel.job import Workers
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.write.recorder import Recorder
-from automax_ros.sweep.blueprint import Blueprint
+from automax_ros.sweep.blueprint import RackTemplate
 from automax_ros.sweep.measures import FUNCTIONS, read_measures
 from automax_ros.sweep.points import Point, Varied, grid, read_varied, sample
 from automax_ros.sweep.run import Plan, Stimuli, run_point
@@ -125,7 +125,7 @@ class _Sweep:
 
     plan: Plan
     points: list[Point]
-    where: Where
+    where: Workers
     wanted: Wanted
 
 
@@ -138,7 +138,7 @@ def run(arguments: argparse.Namespace) -> int:
             if sweep is None:
                 return 1
             return _carry_out(sweep, arguments, stop)
-        except CutShort:
+        except WorkInterrupted:
             return stop.code
         except RackError as error:
             return print_refused("sweep", error)
@@ -166,10 +166,10 @@ def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
         measures = (*measures, best)
     stimuli = arguments.stimuli and Stimuli.of(arguments.stimuli, allow_outside=arguments.allow_outside)
     quantities = tuple(item.quantity for item in varied)
-    if len(points) < _FEW and where == Where(None):
-        where = Where(1)
+    if len(points) < _FEW and where == Workers(None):
+        where = Workers(1)
     native = native_forms(arguments, arguments.duration * len(points) // where.processes)
-    plan = Plan(Blueprint.of(rack, native), quantities, measures, arguments.duration, stimuli)
+    plan = Plan(RackTemplate.of(rack, native), quantities, measures, arguments.duration, stimuli)
     first = _read("--vary", lambda: plan.blueprint.rack(plan.beginning(points[0]).plants))
     if arguments.verbose:
         tell_native(first.operations.installation.native.values())
@@ -211,7 +211,7 @@ def _rows(sweep: _Sweep, stop: StopRequest) -> list[Row]:
         try:
             with stop.cut_short():
                 run_sweep(sweep.plan, sweep.points, sweep.where, take)
-        except CutShort:
+        except WorkInterrupted:
             pass
     return [found[number] for number in sorted(found)]
 
@@ -252,5 +252,5 @@ def _read(option: str, read: Callable[[], _T]) -> _T:
     """
     try:
         return read()
-    except Fault as fault:
+    except UserError as fault:
         raise UsageError(f"{option}: {fault.message}", fault.hint) from fault

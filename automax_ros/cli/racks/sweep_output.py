@@ -16,7 +16,7 @@ from automax_ros import __version__
 from automax_ros.cli.output.files import require_folder, write_report, write_text
 from automax_ros.cli.racks.sweep_picture import draw
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import count_of, quoted, table
 from automax_ros.core.ticks import NS_PER_S, seconds_text
 from automax_ros.rackfile.model.config import RackConfig
@@ -54,7 +54,7 @@ def best_of(
     way, _, named = text.strip().partition(" ")
     try:
         found = read_measures(named, config, duration_ns) if way in _WAYS else ()
-    except Fault as fault:
+    except UserError as fault:
         raise UsageError(f"--best: {fault.message}", fault.hint) from fault
     if len(found) != 1:
         raise UsageError(f"--best: {quoted(text)} is not min MEASURE or max MEASURE", "such as 'min rms(SPEED_ERR%)'")

@@ -22,7 +22,7 @@ from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import count_of, did_you_mean, printable, quoted
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.read.playback import NOT_CHOSEN, Renaming, Survey, choose, survey
+from automax_ros.recordings.read.playback import NOT_CHOSEN, PlayableRecording, Renaming, choose, survey
 
 if TYPE_CHECKING:
     from automax_ros.ros.clients.player import Player
@@ -72,14 +72,14 @@ def run(arguments: argparse.Namespace) -> int:
         return _play(found, renaming, rate, arguments, stop, domain)
 
 
-def _survey(bag: Path, begin: int | None, end: int | None, stop: StopRequest) -> Survey | None:
+def _survey(bag: Path, begin: int | None, end: int | None, stop: StopRequest) -> PlayableRecording | None:
     """Read the recording once, so that nothing is sent of one that is damaged; None if a signal comes."""
     with ProgressBar(f"reading {bag.name}", _PERMILLE) as bar:
         found = survey(bag, begin, end, lambda done: bar.show(int(_PERMILLE * done)), lambda: stop.requested)
     return None if stop.requested else found
 
 
-def _choose(found: Survey, texts: list[str] | None) -> None:
+def _choose(found: PlayableRecording, texts: list[str] | None) -> None:
     if texts is None:
         return
     patterns = [item.strip() for text in texts for item in text.split(",") if item.strip()]
@@ -90,7 +90,12 @@ def _choose(found: Survey, texts: list[str] | None) -> None:
 
 
 def _play(
-    found: Survey, renaming: Renaming, rate: float, arguments: argparse.Namespace, stop: StopRequest, domain: int
+    found: PlayableRecording,
+    renaming: Renaming,
+    rate: float,
+    arguments: argparse.Namespace,
+    stop: StopRequest,
+    domain: int,
 ) -> int:
     from automax_ros.ros.clients.player import Player
 
@@ -103,18 +108,18 @@ def _play(
 
 
 @contextmanager
-def _locks(found: Survey, renaming: Renaming, domain: int) -> Iterator[None]:
+def _locks(found: PlayableRecording, renaming: Renaming, domain: int) -> Iterator[None]:
     """Keep racks of these names from starting here meanwhile; refuse where one runs."""
     from contextlib import ExitStack
 
-    from automax_ros.ros.setup.lock import LockError, RackAlreadyRuns, RackLock
+    from automax_ros.ros.setup.lock import InstanceLock, LockError, RackAlreadyRuns
 
     with ExitStack() as stack:
         for space in (renaming.space(item) for item in found.spaces):
             if not _SIMPLE.fullmatch(space):
                 continue
             try:
-                stack.enter_context(RackLock(space[1:], domain))
+                stack.enter_context(InstanceLock(space[1:], domain))
             except RackAlreadyRuns as error:
                 raise UsageError(str(error).split(":", 1)[0], _LIVE_HINT) from error
             except LockError as error:
@@ -128,7 +133,7 @@ _LIVE_HINT = "stop it, play elsewhere with --namespace, or mix both with --force
 class _Show:
     """One playback as the person sees it."""
 
-    def __init__(self, found: Survey, player: Player, stop: StopRequest, domain: int) -> None:
+    def __init__(self, found: PlayableRecording, player: Player, stop: StopRequest, domain: int) -> None:
         self._found, self._player, self._stop, self._domain = found, player, stop, domain
         self._line = StatusLine()
         self._shown = 0

@@ -19,7 +19,7 @@ from automax_ros.cli.output.screen import print_diagnostics, share_shown, tell_w
 from automax_ros.cli.output.signals import ended_by_signals
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.parallel.job import ClusterFault, Where
+from automax_ros.parallel.job import ClusterFault, Workers
 from automax_ros.rackfile.reading.files import FileFault, read_task_source
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if report.identical else 1
 
 
-def _replayed(replay: Replay, where: Where, arguments: argparse.Namespace) -> ReplayReport:
+def _replayed(replay: Replay, where: Workers, arguments: argparse.Namespace) -> ReplayReport:
     """Replay, print the report, draw the picture."""
     for source, diagnostics in replay.warnings:
         tell_warnings([(source, diagnostics)], Path(source.name).name, Path(source.name))

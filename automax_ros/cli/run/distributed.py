@@ -12,16 +12,16 @@ from automax_ros.cli.options.stimuli import stimulation
 from automax_ros.cli.output.files import write_report
 from automax_ros.cli.output.signals import StopRequest
 from automax_ros.cli.run.plan import RunPlan, warn
-from automax_ros.cli.run.process_messages import Said, Told, merged_report
-from automax_ros.cli.run.status import Person, Progress, Summary, merged_progress, merged_summary
-from automax_ros.cli.run.supervisor import Post, Supervisor
+from automax_ros.cli.run.process_messages import ProcessMessage, TextLine, merged_report
+from automax_ros.cli.run.status import Progress, Summary, TerminalOutput, merged_progress, merged_summary
+from automax_ros.cli.run.supervisor import ProcessSpec, Supervisor
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.processes import Seat, seats_of
+from automax_ros.rackfile.processes import RackProcess, processes_of
 from automax_ros.ros.setup.discovery import range_text
-from automax_ros.ros.setup.lock import RackLock, domain_id
+from automax_ros.ros.setup.lock import InstanceLock, domain_id
 
 _Part = TypeVar("_Part")
 _SEATS, _HOME, _RECORDER = range(3)
@@ -39,11 +39,11 @@ def run_distributed(plan: RunPlan, arguments: argparse.Namespace, stop: StopRequ
     ``arguments`` are those of ``automax run``, from which the plan was made.
     """
     domain = domain_id()
-    with RackLock(plan.config.namespace, domain, _WHOLE):
+    with InstanceLock(plan.config.namespace, domain, _WHOLE):
         rack = Rack(plan.config)
         warn(rack)
         stimulation(rack, plan.stimuli, allow_outside=plan.allow_outside)
-        seats = seats_of(plan.config, rack.operations.installation.programs.values())
+        seats = processes_of(plan.config, rack.operations.installation.programs.values())
         watch = _Watch(plan, seats)
         watch.message(_opening(plan, seats, domain))
         posts = list(_posts(plan, seats, arguments))
@@ -52,7 +52,7 @@ def run_distributed(plan: RunPlan, arguments: argparse.Namespace, stop: StopRequ
         return watch.conclude(supervisor)
 
 
-def _posts(plan: RunPlan, seats: Sequence[Seat], arguments: argparse.Namespace) -> Iterator[Post]:
+def _posts(plan: RunPlan, seats: Sequence[RackProcess], arguments: argparse.Namespace) -> Iterator[ProcessSpec]:
     # What happens to lie in the working folder is not to be imported.
     safe = ["-P"] if sys.version_info >= (3, 11) else []
     automax = [sys.executable, *safe, "-m", "automax_ros.cli.main"]
@@ -64,13 +64,17 @@ def _posts(plan: RunPlan, seats: Sequence[Seat], arguments: argparse.Namespace) 
     if plan.record is not None:
         command = [*automax, "record", str(plan.config.path), "--output", str(plan.record), "--wait", _RECORDER_WAIT_S]
         command += [*_recording(arguments), *_ros(plan, arguments)]
-        yield Post(_RECORDER_NAME, command, _RECORDER, reports=False, begins_run=True)
+        yield ProcessSpec(_RECORDER_NAME, command, _RECORDER, reports=False, begins_run=True)
     for seat in seats:
         own = ["--state", str(plan.state / seat.name)] if plan.state is not None else []
         own += ["--await-recorder"] if plan.record is not None else []
-        own += _given("--set", arguments.settings) + _given("--watch", arguments.watch) if seat.is_home else []
+        own += (
+            _given("--set", arguments.settings) + _given("--watch", arguments.watch) if seat.holds_common_memory else []
+        )
         command = [*automax, "node", *common, "--module", seat.name, *own, *_ros(plan, arguments)]
-        yield Post(seat.name, command, _HOME if seat.is_home else _SEATS, ends_run=seat.is_home)
+        yield ProcessSpec(
+            seat.name, command, _HOME if seat.holds_common_memory else _SEATS, ends_run=seat.holds_common_memory
+        )
 
 
 def _recording(arguments: argparse.Namespace) -> list[str]:
@@ -101,7 +105,7 @@ def _seconds(time_ns: int) -> str:
     return f"{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d}"
 
 
-def _opening(plan: RunPlan, seats: Sequence[Seat], domain: int) -> str:
+def _opening(plan: RunPlan, seats: Sequence[RackProcess], domain: int) -> str:
     config = plan.config
     return (
         f"rack {config.name} in {count_of(len(seats), 'process')}: "
@@ -113,18 +117,18 @@ def _opening(plan: RunPlan, seats: Sequence[Seat], domain: int) -> str:
 class _Watch:
     """What the person sees of the processes, and what they came to."""
 
-    def __init__(self, plan: RunPlan, seats: Sequence[Seat]) -> None:
+    def __init__(self, plan: RunPlan, seats: Sequence[RackProcess]) -> None:
         self._plan, self._names = plan, [seat.name for seat in seats]
         self._home = self._names[0]
-        self._screen = Person()
+        self._screen = TerminalOutput()
         self.message = self._screen.message
         self._progress: dict[str, Progress] = {}
         self._summaries: dict[str, Summary] = {}
         self._reports: dict[str, Any] = {}
 
-    def heard(self, name: str, told: Told) -> None:
+    def heard(self, name: str, told: ProcessMessage) -> None:
         """Show what a process says; parts are shown together."""
-        if isinstance(told, Said):
+        if isinstance(told, TextLine):
             self.message(f"{name}: {told.text}")
         elif isinstance(told, Progress):
             self._progress[name] = told

@@ -11,11 +11,11 @@ from pathlib import Path
 
 from automax_ros.cli.options.stimuli import StimuliRefused
 from automax_ros.cli.output.screen import print_diagnostics
-from automax_ros.cli.output.signals import CutShort, StopRequest
+from automax_ros.cli.output.signals import StopRequest, WorkInterrupted
 from automax_ros.cli.run.live import LiveSession
 from automax_ros.cli.run.plan import RunPlan
 from automax_ros.core.diagnostics import render
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.recordings.mcap.errors import BagError
@@ -24,7 +24,7 @@ from automax_ros.ros.base.module_lifecycle import NOT_OPERATED
 from automax_ros.ros.nodes.rack import RackNode
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.discovery import range_text
-from automax_ros.ros.setup.lock import RackLock, domain_id
+from automax_ros.ros.setup.lock import InstanceLock, domain_id
 from automax_ros.ros.setup.process import RosProcess
 from automax_ros.runtime.health import Health
 
@@ -32,13 +32,13 @@ _LOOK_S = 0.05
 """Longest wait while no rack runs."""
 _MOST_TOLD = 100
 """Most findings of a file that go to the log."""
-_FAULTS = (RackError, StimuliRefused, BagError, Fault)
+_FAULTS = (RackError, StimuliRefused, BagError, UserError)
 """What a rack can have against being configured: things for the person to mend."""
 _PARTS_END = "the rack runs in several processes: they are started and ended by `automax run --distributed`"
 
 
 @dataclass(frozen=True)
-class Managed:
+class LifecycleRun:
     """What is managed: a rack's name in the graph, and how its plan is read.
 
     ``plan`` is that of the first configuration where it was read already; ``read`` reads the files (again).
@@ -50,10 +50,10 @@ class Managed:
     ros: RosArguments = NO_ARGUMENTS
 
 
-class ManagedRun:
+class LifecycleRunner:
     """Carries out the transitions of one rack's node, and lets the rack live in between."""
 
-    def __init__(self, managed: Managed, process: RosProcess, stop: StopRequest, domain: int) -> None:
+    def __init__(self, managed: LifecycleRun, process: RosProcess, stop: StopRequest, domain: int) -> None:
         self._managed, self._process, self._stop, self._domain = managed, process, stop, domain
         self._asked: deque[Callable[[], None]] = deque()
         self._session: LiveSession | None = None
@@ -123,7 +123,7 @@ class ManagedRun:
         """Read the files and compile: the nodes of the modules appear."""
         try:
             self._configure()
-        except CutShort as cut:
+        except WorkInterrupted as cut:
             raise TransitionRefused("the program ends") from cut
         except _FAULTS as fault:
             self._tell(fault)
@@ -170,7 +170,7 @@ class ManagedRun:
         try:
             if not session.start(self._stop):
                 raise TransitionRefused("the program ends")
-        except Fault as fault:
+        except UserError as fault:
             raise TransitionRefused(str(fault)) from fault
 
     def _end_session(self) -> None:
@@ -225,29 +225,29 @@ def run_live(plan: RunPlan, stop: StopRequest) -> int:
 
     Returns the exit code. Raises what keeps the rack from running: see ``LiveSession``.
     """
-    if plan.seat is None or plan.seat.seat.is_home:
-        return run_managed(Managed(plan.config.namespace, lambda: plan, plan, plan.ros), stop)
+    if plan.seat is None or plan.seat.seat.holds_common_memory:
+        return run_managed(LifecycleRun(plan.config.namespace, lambda: plan, plan, plan.ros), stop)
     domain = domain_id()
-    with RackLock(plan.config.namespace, domain, plan.seat.seat.name):
+    with InstanceLock(plan.config.namespace, domain, plan.seat.seat.name):
         return _run_part(plan, stop, domain)
 
 
-def run_managed(managed: Managed, stop: StopRequest) -> int:
+def run_managed(managed: LifecycleRun, stop: StopRequest) -> int:
     """Run a rack as a managed node: at once where its plan is there, else when a lifecycle manager asks for it.
 
     Returns the exit code. Raises what keeps the rack from starting at once.
     """
     domain, plan = domain_id(), managed.plan
     seat = None if plan is None or plan.seat is None else plan.seat.seat.name
-    with RackLock(managed.namespace, domain, seat):
+    with InstanceLock(managed.namespace, domain, seat):
         process = RosProcess(managed.ros)
         try:
-            return _run_managed(ManagedRun(managed, process, stop, domain), _waiting(managed, domain))
+            return _run_managed(LifecycleRunner(managed, process, stop, domain), _waiting(managed, domain))
         finally:
             process.close()
 
 
-def _run_managed(run: ManagedRun, waiting: str | None) -> int:
+def _run_managed(run: LifecycleRunner, waiting: str | None) -> int:
     try:
         if waiting is None:
             run.autostart()
@@ -271,13 +271,13 @@ def _run_part(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         finally:
             code = session.close()
         return code
-    except CutShort:
+    except WorkInterrupted:
         return 0
     finally:
         process.close()
 
 
-def _waiting(managed: Managed, domain: int) -> str | None:
+def _waiting(managed: LifecycleRun, domain: int) -> str | None:
     """Return what is printed where a manager is waited for."""
     if managed.plan is not None:
         return None

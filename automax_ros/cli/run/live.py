@@ -13,14 +13,14 @@ from automax_ros.cli.options.rack import begin_with
 from automax_ros.cli.options.stimuli import stimulation as stimulation_of
 from automax_ros.cli.output.signals import StopRequest
 from automax_ros.cli.run.plan import RunPlan, conclude, report_at_end, tell_forms, warn
-from automax_ros.cli.run.saving import DiskSync, RecordingWatch, StateKeeping
+from automax_ros.cli.run.saving import DiskSync, RecordingMonitor, SavedState
 from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.base.stop_cause import StopCause
 from automax_ros.rack.rack import Rack
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.ros.base.node import follows_clock
-from automax_ros.ros.distributed.bus import LEAD_NS, Seating
+from automax_ros.ros.distributed.bus import LEAD_NS, ProcessLayout
 from automax_ros.ros.nodes.rack import RackNode
 from automax_ros.ros.rack_nodes import LiveRack
 from automax_ros.ros.setup.discovery import range_text
@@ -62,7 +62,7 @@ class LiveSession:
                 warn(rack)
             tell_forms(rack, plan)
             self._stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
-        self._state = StateKeeping(rack, plan.state_folder)
+        self._state = SavedState(rack, plan.state_folder)
         self._operated = OperationLog(lambda: self._stimulation.is_acting)
         self._told: StopCause | None = None
         self._ending = ExitStack()
@@ -76,7 +76,7 @@ class LiveSession:
             self._display = StatusDisplay(
                 rack, plan.shown(rack), live=True, health=self.live.health, screen=plan.screen
             )
-            self._recording = RecordingWatch(self._recorder(), self._display)
+            self._recording = RecordingMonitor(self._recorder(), self._display)
         except BaseException:
             self._ending.close()
             raise
@@ -154,13 +154,15 @@ class LiveSession:
         self._ending.push(rack.__exit__)
         return recorder
 
-    def _seating(self) -> Seating | None:
+    def _seating(self) -> ProcessLayout | None:
         seat = self.plan.seat
         if seat is None:
             return None
-        lead_ns = LEAD_NS if seat.lead_ns is None else seat.lead_ns
+        start_delay_ns = LEAD_NS if seat.start_delay_ns is None else seat.start_delay_ns
         seats = [item.slots for item in seat.seats]
-        return Seating(seats, seat.run_id, lambda: self._stimulation.is_common, lead_ns, seat.awaits_recorder)
+        return ProcessLayout(
+            seats, seat.run_id, lambda: self._stimulation.is_common, start_delay_ns, seat.awaits_recorder
+        )
 
     def _all_are_there(self, stop: StopRequest) -> bool:
         """Wait for the other processes of a distributed rack; FALSE where a stop is requested first."""

@@ -20,14 +20,14 @@ from automax_ros.cli.options.work import add_native_arguments, native_forms
 from automax_ros.cli.output.files import held_for_writing
 from automax_ros.cli.output.signals import StopRequest, stop_signals
 from automax_ros.cli.run.child_process import end_with_watcher
-from automax_ros.cli.run.plan import RunPlan, SeatPlan
+from automax_ros.cli.run.plan import ProcessPlan, RunPlan
 from automax_ros.cli.run.run import check_files, folder, watched_commons
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import quoted
 from automax_ros.rack.operator.retention import RetentionFault
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.processes import Seat, seat_named, seats_of
+from automax_ros.rackfile.processes import RackProcess, processes_of, seat_named
 from automax_ros.recordings.write.recorder import RecordingOptions
 
 _MOST_ID = (1 << 63) - 1
@@ -100,16 +100,16 @@ def run(arguments: argparse.Namespace) -> int:
         config = config_of(arguments.config, allow_outside=arguments.allow_outside, quiet=arguments.watched)
         if config is None:
             return 1
-        seats = seats_of(config)
+        seats = processes_of(config)
         if arguments.module is None:
             _print_seats(seats)
             return 0
         return _run(arguments, config, seats, stop)
 
 
-def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, ...], stop: StopRequest) -> int:
+def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[RackProcess, ...], stop: StopRequest) -> int:
     seat = seat_named(seats, arguments.module)
-    if arguments.settings and not seat.is_home:
+    if arguments.settings and not seat.holds_common_memory:
         raise UsageError("--set belongs to the process of common memory", "give it to `--module common_memory`")
     ros = ros_arguments(arguments)
     config = replace(config, namespace=ros.placed(config.namespace))
@@ -125,7 +125,7 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, .
         arguments.report,
         arguments.allow_outside,
         ros,
-        SeatPlan(seat, seats, arguments.run_id, arguments.watched, arguments.lead, arguments.await_recorder),
+        ProcessPlan(seat, seats, arguments.run_id, arguments.watched, arguments.lead, arguments.await_recorder),
         native=native_forms(arguments, arguments.duration, wall_clock=True),
         verbose=arguments.verbose,
     )
@@ -142,7 +142,7 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, .
         return 2
 
 
-def _print_seats(seats: tuple[Seat, ...]) -> None:
+def _print_seats(seats: tuple[RackProcess, ...]) -> None:
     """Print the processes of a rack, each with why its modules share it."""
     for seat in seats:
         print(f"{seat.name:18}{' '.join(seat.modules)}")

@@ -11,8 +11,8 @@ from typing import Any
 from automax_ros.cli.options.work import tell_native
 from automax_ros.cli.output.files import write_report
 from automax_ros.cli.output.screen import tell_warnings
-from automax_ros.cli.run.process_messages import ToldScreen, tell_report
-from automax_ros.cli.run.status import Person, Screen
+from automax_ros.cli.run.process_messages import ProcessOutput, tell_report
+from automax_ros.cli.run.status import RunOutput, TerminalOutput
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.types import Value
 from automax_ros.rack.operator.retention import default_folder
@@ -20,29 +20,29 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.model.config import CommonElement, RackConfig
 from automax_ros.rackfile.model.value_names import Tuning, watched
-from automax_ros.rackfile.processes import Seat
+from automax_ros.rackfile.processes import RackProcess
 from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.runtime.time.simulated_pacer import SimulatedTime
 from automax_ros.scenario.report import report_of
-from automax_ros.scenario.stimuli.player import Stimulation
-from automax_ros.scenario.stimuli.stage import Happened
+from automax_ros.scenario.stimuli.player import StimuliPlayer
+from automax_ros.scenario.stimuli.stage import OperationRecord
 
 
 @dataclass(frozen=True)
-class SeatPlan:
+class ProcessPlan:
     """The part of a run of a distributed rack that is in this process.
 
     ``seats`` are all processes of the rack. ``run_id`` is the number of the run, 0 to take that of the processes that
-    are there, or a new one. ``watched``: another process has started this one. ``lead_ns`` is how long after all are
-    there the rack starts, None for the usual. ``awaits_recorder``: not before a recorder hears this process.
+    are there, or a new one. ``watched``: another process has started this one. ``start_delay_ns`` is how long after all
+    are there the rack starts, None for the usual. ``awaits_recorder``: not before a recorder hears this process.
     """
 
-    seat: Seat
-    seats: tuple[Seat, ...]
+    seat: RackProcess
+    seats: tuple[RackProcess, ...]
     run_id: int = 0
     watched: bool = False
-    lead_ns: int | None = None
+    start_delay_ns: int | None = None
     awaits_recorder: bool = False
 
 
@@ -70,7 +70,7 @@ class RunPlan:
     report: Path | None = None
     allow_outside: bool = False
     ros: RosArguments = NO_ARGUMENTS
-    seat: SeatPlan | None = None
+    seat: ProcessPlan | None = None
     simulated: SimulatedTime | None = None
     tunings: tuple[Tuning, ...] = ()
     native: NativeForms = IN_PYTHON
@@ -98,7 +98,7 @@ class RunPlan:
         """Return the commons that the status line of a rack, or of this process's part of it, shows."""
         if self.watch is not None:
             return self.watch
-        if self.seat is not None and not self.seat.seat.is_home:
+        if self.seat is not None and not self.seat.seat.holds_common_memory:
             return ()
         if self.seat is None or rack.config.watch is not None:
             return watched(rack.config, None, rack.operations.installation.programs.values())
@@ -106,9 +106,9 @@ class RunPlan:
         return watched(rack.config, None, [program for program in programs if program is not None])
 
     @property
-    def screen(self) -> Screen:
+    def screen(self) -> RunOutput:
         """Where the run is shown."""
-        return ToldScreen() if self.is_watched else Person()
+        return ProcessOutput() if self.is_watched else TerminalOutput()
 
 
 def warn(rack: Rack) -> None:
@@ -122,7 +122,7 @@ def tell_forms(rack: Rack, plan: RunPlan) -> None:
         tell_native(rack.operations.installation.native.values())
 
 
-def report_at_end(rack: Rack, stimulation: Stimulation, others: Sequence[Happened] = ()) -> dict[str, Any]:
+def report_at_end(rack: Rack, stimulation: StimuliPlayer, others: Sequence[OperationRecord] = ()) -> dict[str, Any]:
     """Return the report of a rack as it is before anything is closed; ``others`` have operated it besides stimuli."""
     return report_of(rack, sorted((*stimulation.happened, *others), key=lambda item: item.at_ns))
 

@@ -18,7 +18,7 @@ _PERIOD_NS = NS_PER_S // 5
 
 
 @dataclass(frozen=True)
-class Said:
+class TextLine:
     """A line for the person."""
 
     text: str
@@ -31,11 +31,11 @@ class Reported:
     report: Mapping[str, Any]
 
 
-Told = Said | Progress | Summary | Reported
+ProcessMessage = TextLine | Progress | Summary | Reported
 """What a line says."""
 
 
-class ToldScreen:
+class ProcessOutput:
     """The screen of a process that another one watches (``cli/run/status.Screen``)."""
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ def tell_report(report: Mapping[str, Any]) -> None:
     _tell("report", report)
 
 
-def heard(line: str) -> Told:
+def heard(line: str) -> ProcessMessage:
     """Return what a line of a process says."""
     try:
         data = json.loads(line)
@@ -78,7 +78,7 @@ def heard(line: str) -> Told:
             return _KINDS[key](value)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         pass
-    return Said(printable(line))
+    return TextLine(printable(line))
 
 
 def _tell(key: str, value: object) -> None:
@@ -90,8 +90,8 @@ def _with_tuples(data: Mapping[str, Any]) -> dict[str, Any]:
     return {key: tuple(value) if isinstance(value, list) else value for key, value in data.items()}
 
 
-_KINDS: dict[str, Callable[[Any], Told]] = {
-    "say": lambda text: Said(str(text)),
+_KINDS: dict[str, Callable[[Any], ProcessMessage]] = {
+    "say": lambda text: TextLine(str(text)),
     "progress": lambda data: Progress(**_with_tuples(data)),
     "summary": lambda data: Summary(**_with_tuples(data)),
     "report": Reported,

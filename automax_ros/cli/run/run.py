@@ -28,11 +28,11 @@ from automax_ros.cli.options.stimuli import StimuliRefused
 from automax_ros.cli.options.values import add_watch_argument, option_number, seconds_above_0, watch_list
 from automax_ros.cli.options.work import add_native_arguments, native_forms
 from automax_ros.cli.output.files import held_for_writing, require_different_files, require_folder, require_writable
-from automax_ros.cli.output.signals import CutShort, StopRequest, stop_signals
+from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
 from automax_ros.cli.run.plan import RunPlan
 from automax_ros.cli.run.simulated import run_simulated
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.types import bare_name
 from automax_ros.rack.operator.retention import RetentionFault
 from automax_ros.rack.tasks.installation import RackError
@@ -136,7 +136,7 @@ def run(arguments: argparse.Namespace) -> int:
             prepare_ros(arguments, WITHOUT_ROS)
         try:
             return _run(arguments, stop)
-        except CutShort:
+        except WorkInterrupted:
             if arguments.with_ros or not arguments.simulated:
                 return 0
             print("automax run: ended before its first scan; nothing was recorded or reported", file=sys.stderr)
@@ -165,18 +165,18 @@ def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
 
         _check_clock(plan)
         return run_distributed(plan, arguments, stop)
-    from automax_ros.cli.run.lifecycle import Managed, run_managed
+    from automax_ros.cli.run.lifecycle import LifecycleRun, run_managed
 
-    return run_managed(Managed(plan.config.namespace, lambda: _read(arguments, stop), plan, plan.ros), stop)
+    return run_managed(LifecycleRun(plan.config.namespace, lambda: _read(arguments, stop), plan, plan.ros), stop)
 
 
 def _run_managed(arguments: argparse.Namespace, stop: StopRequest) -> int:
-    from automax_ros.cli.run.lifecycle import Managed, run_managed
+    from automax_ros.cli.run.lifecycle import LifecycleRun, run_managed
 
     ros = ros_arguments(arguments)
     with stop.cut_short():
         space = ros.placed(namespace_of(arguments.config))
-    return run_managed(Managed(space, lambda: _read(arguments, stop), ros=ros), stop)
+    return run_managed(LifecycleRun(space, lambda: _read(arguments, stop), ros=ros), stop)
 
 
 def _read(arguments: argparse.Namespace, stop: StopRequest) -> RunPlan:
@@ -259,5 +259,5 @@ def watched_commons(config: RackConfig, texts: list[str] | None) -> tuple[Common
     """
     try:
         return None if texts is None else tuple(watched(config, watch_list(texts)))
-    except Fault as error:
+    except UserError as error:
         raise UsageError(f"--watch: {error.message}", error.hint) from error

@@ -19,7 +19,7 @@ SYNC_PERIOD_S = 0.4
 """Pause between two waits for the disk itself, so that a power failure costs about a second too."""
 
 
-class RecordingWatch:
+class RecordingMonitor:
     """Tells the person when a recording ends before its rack; without a recorder it does nothing."""
 
     def __init__(self, recorder: Recorder | None, display: StatusDisplay) -> None:
@@ -69,7 +69,7 @@ SAVE_PERIOD_NS = 5 * NS_PER_S
 """How often a changed state is saved while the rack runs, so that a killed run loses little (decision)."""
 
 
-class StateKeeping:
+class SavedState:
     """Keeps a rack's state in a folder, or nowhere if that is None."""
 
     def __init__(self, rack: Rack, folder: Path | None) -> None:

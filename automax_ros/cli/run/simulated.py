@@ -6,13 +6,13 @@ from automax_ros.cli.options.rack import begin_with
 from automax_ros.cli.options.stimuli import stimulation as stimulation_of
 from automax_ros.cli.output.signals import StopRequest
 from automax_ros.cli.run.plan import RunPlan, conclude, report_at_end, tell_forms, warn
-from automax_ros.cli.run.saving import RecordingWatch, StateKeeping
+from automax_ros.cli.run.saving import RecordingMonitor, SavedState
 from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
 from automax_ros.recordings.write.recorder import Recorder
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 
 SLICE_NS = 100 * NS_PER_MS
 """Rack time between two looks at signals and the display."""
@@ -34,8 +34,8 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, plan.record, plan.recording) if plan.record is not None else None
     display = StatusDisplay(rack, plan.shown(rack), live=False)
-    recording = RecordingWatch(recorder, display)
-    state = StateKeeping(rack, plan.state)
+    recording = RecordingMonitor(recorder, display)
+    state = SavedState(rack, plan.state)
     begin_with(rack, plan.tunings)
     end_ns = _ENDLESS_NS if plan.duration_ns is None else plan.duration_ns
     try:
@@ -64,7 +64,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     return conclude(rack, plan, report_at_end(rack, stimulation), failed=failed)
 
 
-def _goes_on(rack: Rack, plan: RunPlan, stimulation: Stimulation) -> bool:
+def _goes_on(rack: Rack, plan: RunPlan, stimulation: StimuliPlayer) -> bool:
     """Whether something can still happen: with stimuli a run lasts its duration, or until the last of them.
 
     So a rack that is stopped can be put into RUN again; without stimuli nobody would (decision).

@@ -14,8 +14,8 @@ from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.core.values import value_text
-from automax_ros.rack.modules.drive import Timed
 from automax_ros.rack.modules.module import Module
+from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.runtime.health import Health
@@ -112,7 +112,7 @@ def recorded_size(folder: Path) -> str:
         return "cannot be read any more"
 
 
-class Screen(Protocol):
+class RunOutput(Protocol):
     """Where a run is shown."""
 
     @property
@@ -137,7 +137,7 @@ class Screen(Protocol):
         ...
 
 
-class Person:
+class TerminalOutput:
     """The screen of a person: standard output."""
 
     def __init__(self) -> None:
@@ -169,11 +169,11 @@ class StatusDisplay:
         *,
         live: bool,
         health: Health | None = None,
-        screen: Screen | None = None,
+        screen: RunOutput | None = None,
     ) -> None:
         """Begin; nothing is shown before the first update is due. ``screen`` is a person's unless it is given."""
         self._rack, self._watch, self._live, self._health = rack, watch, live, health
-        self._screen: Screen = Person() if screen is None else screen
+        self._screen: RunOutput = TerminalOutput() if screen is None else screen
         self.message = self._screen.message
         self._last_rack_ns = 0
         self._last_scans = 0

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Protocol
 
 from automax_ros.cli.run.child_process import Child, Lines
-from automax_ros.cli.run.process_messages import Reported, Told, heard
+from automax_ros.cli.run.process_messages import ProcessMessage, Reported, heard
 from automax_ros.cli.run.status import Progress
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 
@@ -57,7 +57,7 @@ GRACE_NS = 2 * NS_PER_S
 
 
 @dataclass(frozen=True)
-class Post:
+class ProcessSpec:
     """A process to keep running.
 
     Attributes:
@@ -80,7 +80,7 @@ class Post:
 class Listener(Protocol):
     """Who is told what processes say and how they fare."""
 
-    def heard(self, name: str, told: Told) -> None:
+    def heard(self, name: str, told: ProcessMessage) -> None:
         """A process has said something."""
         ...
 
@@ -94,14 +94,14 @@ class Listener(Protocol):
 
 
 @dataclass
-class _Place:
+class _Supervised:
     """A post and who holds it.
 
     ``start_ns`` is when it is to be started, None where it is not. ``code`` is the exit code of one that is over.
     ``has_begun``: it has told how it stands, once. ``reported``: it ends in order.
     """
 
-    post: Post
+    post: ProcessSpec
     start_ns: int | None = 0
     child: Child | None = None
     restarts: Restarts = field(default_factory=Restarts)
@@ -115,14 +115,14 @@ class Supervisor:
 
     def __init__(
         self,
-        posts: Sequence[Post],
+        posts: Sequence[ProcessSpec],
         listener: Listener,
         *,
         restart: bool = True,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         """Take what to keep running, first things first; nothing is started yet."""
-        self._places = [_Place(post) for post in posts]
+        self._places = [_Supervised(post) for post in posts]
         self._listener, self._restart, self._clock = listener, restart, clock
         self._selector = selectors.DefaultSelector()
         self._stage = -1
@@ -177,13 +177,13 @@ class Supervisor:
             if not key.fileobj.read():
                 self._selector.unregister(key.fileobj)
 
-    def _hear(self, place: _Place, line: str) -> None:
+    def _hear(self, place: _Supervised, line: str) -> None:
         told = heard(line)
         place.has_begun = place.has_begun or isinstance(told, Progress)
         place.reported = place.reported or isinstance(told, Reported)
         self._listener.heard(place.post.name, told)
 
-    def _over(self, place: _Place, child: Child) -> None:
+    def _over(self, place: _Supervised, child: Child) -> None:
         """Take leave of a process that has ended: in order, or not."""
         for stream in (child.out, child.err):
             while stream in self._selector.get_map() and stream.read():

@@ -19,7 +19,7 @@ from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import count_of, printable
 from automax_ros.rackfile.old_plants.sources import Converted, convert
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
-from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write
 
 KEPT_SUFFIX = ".orig"
 """What --write adds to the name under which it keeps the old file."""
@@ -108,7 +108,7 @@ def _make(folder: Path) -> None:
 def _write(path: Path, data: bytes, *, over: bool) -> None:
     try:
         if over:
-            with written_whole(path) as temporary:
+            with atomic_write(path) as temporary:
                 temporary.write_bytes(data)
         else:
             with path.open("xb") as stream:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.cli.usage import UsageError
-from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write
 from automax_ros.tuning.frequency import decibels, logarithmic
 from automax_ros.tuning.response import BlockResponse, Point, followed
 
@@ -44,7 +44,7 @@ def plot(response: BlockResponse, path: Path) -> None:
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
     with matplotlib.rc_context({"svg.hashsalt": "automax"}):
         try:
-            with written_whole(path) as place:
+            with atomic_write(path) as place:
                 figure_of(response).savefig(place, dpi=130, metadata=metadata)
         except OSError as error:
             raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error

@@ -35,7 +35,7 @@ from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_text
 from automax_ros.runtime.scan.error_log import LogEntry
-from automax_ros.runtime.tasks.standalone_task import LoneTask, LoneVariable
+from automax_ros.runtime.tasks.standalone_task import LoneVariable, StandaloneTask
 from automax_ros.runtime.tasks.task import ScanRecord, Status
 from automax_ros.scenario.stimuli.reader import read_for_task
 from automax_ros.scenario.stimuli.values import goes_on_for_ever
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         print_diagnostics(result.diagnostics, source, sys.stderr)
         return 1
     require_clock(arguments.file, result.program)
-    lone = LoneTask(result.program, native_forms(arguments, _expected_ns(arguments, result.program.period_ns)))
+    lone = StandaloneTask(result.program, native_forms(arguments, _expected_ns(arguments, result.program.period_ns)))
     if arguments.verbose:
         tell_native([lone.native])
     watched = _watched(lone, watch_list(arguments.watch))
@@ -121,7 +121,9 @@ def _expected_ns(arguments: argparse.Namespace, period_ns: int) -> int:
 class _Trace:
     """One run of a task over a table."""
 
-    def __init__(self, lone: LoneTask, watched: Sequence[LoneVariable], output: TextIO, errors: TextIO | None) -> None:
+    def __init__(
+        self, lone: StandaloneTask, watched: Sequence[LoneVariable], output: TextIO, errors: TextIO | None
+    ) -> None:
         """Write the headers and put the task into RUN."""
         self._lone = lone
         self._cells = [(item.read, _text_of(item.symbol.type)) for item in watched]
@@ -172,7 +174,7 @@ def _text_of(kind: DataType) -> Callable[..., str]:
     return printable if kind is DataType.STRING else value_text
 
 
-def _watched(lone: LoneTask, names: list[str] | None) -> list[LoneVariable]:
+def _watched(lone: StandaloneTask, names: list[str] | None) -> list[LoneVariable]:
     if names is None:
         return lone.simple_variables()
     try:
@@ -182,7 +184,7 @@ def _watched(lone: LoneTask, names: list[str] | None) -> list[LoneVariable]:
     return list({item.label: item for item in found}.values())
 
 
-def _conclusion(lone: LoneTask, *, all_told: bool) -> int:
+def _conclusion(lone: StandaloneTask, *, all_told: bool) -> int:
     """Say on standard error what the table does not show, and return the exit code."""
     task, log = lone.task, lone.task.errors
     if log.first is not None and not all_told:

@@ -15,9 +15,9 @@ from automax_ros.core.types import DataType
 from automax_ros.core.values import is_number, value_of, value_text, wanted
 from automax_ros.language.program import Symbol, lines_that_write
 from automax_ros.language.tree.tree import Scope
-from automax_ros.runtime.tasks.standalone_task import LoneTask, LoneVariable
+from automax_ros.runtime.tasks.standalone_task import LoneVariable, StandaloneTask
 from automax_ros.runtime.time.scheduler import Scheduler
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.stage import Stimulus
 
 _SCAN, _TIME = "scan", "time_s"
@@ -34,7 +34,7 @@ _LONGEST_NS = 10**6 * NS_PER_S
 class InputTable(CsvTable):
     """An open table. ``columns`` are the variables that the header names, in its order; None is not looked at."""
 
-    def __init__(self, path: Path, task: LoneTask) -> None:
+    def __init__(self, path: Path, task: StandaloneTask) -> None:
         """Open a table and read its header.
 
         Raises:
@@ -81,7 +81,7 @@ class InputTable(CsvTable):
         if last and self._time is not None:
             yield last
 
-    def unset(self, task: LoneTask) -> list[str]:
+    def unset(self, task: StandaloneTask) -> list[str]:
         """Return the commons that the task works on, does not write itself and has no column for."""
         given = {variable.symbol.name for variable in self.columns if variable is not None}
         written = lines_that_write(task.program)
@@ -102,7 +102,7 @@ class InputTable(CsvTable):
         """Return a cell with a decimal point, where the table may have a comma."""
         return cell.replace(",", ".") if self.separator == ";" and variable.symbol.type is DataType.REAL else cell
 
-    def _columns(self, task: LoneTask) -> list[LoneVariable | None]:
+    def _columns(self, task: StandaloneTask) -> list[LoneVariable | None]:
         columns: dict[str, LoneVariable | None] = {}
         for name in self.header:
             plain = name.strip()
@@ -162,12 +162,12 @@ class StimulatedScans:
     """
 
     def __init__(
-        self, lone: LoneTask, stimuli: Sequence[Stimulus], table: InputTable | None, duration_ns: int | None
+        self, lone: StandaloneTask, stimuli: Sequence[Stimulus], table: InputTable | None, duration_ns: int | None
     ) -> None:
         """Take a table, a duration, or both: the shorter counts; without both the entries must come to an end."""
         self._period_ns = lone.task.period_ns
         self._scheduler = Scheduler()
-        self._stimulation = Stimulation(stimuli, self._scheduler)
+        self._stimulation = StimuliPlayer(stimuli, self._scheduler)
         self._table = table
         self._most = None if duration_ns is None else -(-duration_ns // self._period_ns)
         self._done = 0

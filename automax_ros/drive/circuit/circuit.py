@@ -21,7 +21,7 @@ from automax_ros.drive.circuit.events import CircuitEvent, EventKind
 from automax_ros.drive.circuit.meter import Sample
 from automax_ros.drive.circuit.network import Network, Phases
 from automax_ros.drive.circuit.scr import BIT, mask_of, numbers_of
-from automax_ros.drive.circuit.waves import ZERO_A, Piece
+from automax_ros.drive.circuit.waves import ZERO_A, WavePiece
 from automax_ros.drive.circuit.wiring import ARMATURE_ARC, PHASE_ARC
 
 ARC_V: Final = 1200.0
@@ -143,7 +143,7 @@ class Circuit(Conduction):
         charge, zero_s, overlap_s = self._charge, self._zero_s, self._overlap_s
         return Sample(duration_s, charge, volt_s, zero_s, overlap_s, self._square, self._pieces, self._highest)
 
-    def pieces(self) -> list[Piece]:
+    def pieces(self) -> list[WavePiece]:
         """Return the armature current since the last sample, interval by interval, without those where none flowed."""
         return self._pieces[:]
 
@@ -290,7 +290,7 @@ class Circuit(Conduction):
         if (state["energy"] is None) != (self.energy is None):
             raise ParameterError("the state is that of a circuit with another choice of energy=")
         super().restore({name: state[name] for name in self._kept})
-        self._pieces = [Piece(*numbers) for numbers in state["_pieces"]]
+        self._pieces = [WavePiece(*numbers) for numbers in state["_pieces"]]
         self._highest = inf
         self.line.restore(state["line"])
         self.bridge.restore(state["bridge"])

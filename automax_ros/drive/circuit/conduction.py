@@ -21,7 +21,7 @@ from automax_ros.drive.circuit.meter import EnergyMeter
 from automax_ros.drive.circuit.network import ARMATURE_SHORT, CROSS_FIRE, LINE_SHORT, Impedances, Network, Phases
 from automax_ros.drive.circuit.scr import BIT, MASK, NUMBER, RAIL_MASKS, numbers_of
 from automax_ros.drive.circuit.search import next_ending, next_turn_on
-from automax_ros.drive.circuit.waves import Piece
+from automax_ros.drive.circuit.waves import WavePiece
 from automax_ros.drive.circuit.wiring import ARMATURE_ARC, PHASE_ARC, settle
 
 EVENTS_KEPT: Final = 10_000
@@ -66,7 +66,7 @@ class Conduction(Stateful):
         self._sample_ns = self.now_ns
         self._current_before = self.current_a
         self._charge = self._volt_s = self._zero_s = self._overlap_s = self._square = self._highest = 0.0
-        self._pieces: list[Piece] = []
+        self._pieces: list[WavePiece] = []
 
     def _run(self, stop_ns: int) -> None:
         """Let time pass to an instant before which no gate begins and the line stays as it is."""
@@ -116,7 +116,7 @@ class Conduction(Stateful):
                         + k * first
                         + a * (1.0 - fall) / decay
                     )
-                    self._pieces.append(Piece(first, theta, omega, c, d, k, a, decay))
+                    self._pieces.append(WavePiece(first, theta, omega, c, d, k, a, decay))
                     highest = self._highest - sag
                     if not (-highest <= current <= highest and -highest <= after <= highest):
                         self._highest = max(current, -current, after, -after) + sag

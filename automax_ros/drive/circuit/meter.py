@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from automax_ros.drive.base.state import Stateful
 from automax_ros.drive.base.totals import add_up
-from automax_ros.drive.circuit.waves import Moments, Piece, Wave, bound
+from automax_ros.drive.circuit.waves import Moments, Wave, WavePiece, bound
 
 if TYPE_CHECKING:
     from automax_ros.drive.circuit.ac_line import AcLine
@@ -41,7 +41,7 @@ class Sample:
         zero_current_s: float,
         overlap_s: float,
         square: float,
-        pieces: list[Piece],
+        pieces: list[WavePiece],
         highest_a: float = inf,
     ) -> None:
         """Take the integrals, and what the current's magnitude (A) has not passed, for all that was looked at."""

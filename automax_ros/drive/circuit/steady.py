@@ -14,7 +14,7 @@ from automax_ros.drive.circuit.circuit import Circuit
 from automax_ros.drive.circuit.firing import ConstantAlpha, natural_angle
 from automax_ros.drive.circuit.meter import Sample
 from automax_ros.drive.circuit.scr import FORWARD, REVERSE
-from automax_ros.drive.circuit.waves import Piece
+from automax_ros.drive.circuit.waves import WavePiece
 
 SETTLED = 1e-9
 """Two windows that differ by less than this part are the same."""
@@ -177,7 +177,7 @@ def _simulated(case: BridgeCase) -> SteadyState:
     raise SteadyStateError(_why(case, mean))
 
 
-def _one_window(circuit: Circuit, bridge: ConstantAlpha, case: BridgeCase) -> tuple[Sample, list[Piece]]:
+def _one_window(circuit: Circuit, bridge: ConstantAlpha, case: BridgeCase) -> tuple[Sample, list[WavePiece]]:
     bridge.advance(circuit.now_ns + case.window_ns)
     pieces = circuit.pieces()
     return circuit.sample(), pieces
@@ -195,7 +195,7 @@ def _why(case: BridgeCase, current_a: float) -> str:
     )
 
 
-def _describe(case: BridgeCase, windows: list[tuple[Sample, list[Piece]]], start_current_a: float) -> SteadyState:
+def _describe(case: BridgeCase, windows: list[tuple[Sample, list[WavePiece]]], start_current_a: float) -> SteadyState:
     time = sum(sample.duration_s for sample, _ in windows)
     mean = sum(sample.charge_c for sample, _ in windows) / time
     square = sum(sample.rms_current_a**2 * sample.duration_s for sample, _ in windows) / time
@@ -216,7 +216,7 @@ def _describe(case: BridgeCase, windows: list[tuple[Sample, list[Piece]]], start
     )
 
 
-def _extremes(pieces: list[Piece], with_zero: bool) -> tuple[float, float]:
+def _extremes(pieces: list[WavePiece], with_zero: bool) -> tuple[float, float]:
     least, most = (0.0, 0.0) if with_zero or not pieces else (inf, -inf)
     for piece in pieces:
         low, high = piece.extremes()

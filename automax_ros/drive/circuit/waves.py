@@ -140,7 +140,7 @@ def _between(
 
 
 @mypyc_attr(acyclic=True)
-class Piece:
+class WavePiece:
     """The armature current (A) over one conduction interval; nobody changes it."""
 
     # Not a tuple: compiled, its numbers stand in it, where a tuple has eight objects.
@@ -198,7 +198,7 @@ class Piece:
         return first_zero(c, d, k, a, 0.0, angle, self.omega, self.decay, 1.0, self.duration_s - start)
 
 
-def bound(piece: Piece) -> float:
+def bound(piece: WavePiece) -> float:
     """Return what the magnitude of a piece's current (A) cannot pass: its ends, and what its bend allows between."""
     duration, theta, omega = piece.duration_s, piece.theta, piece.omega
     c, d, k, a, decay = piece.c, piece.d, piece.k, piece.a, piece.decay

@@ -19,8 +19,8 @@ from automax_ros.messages.cdr.parts import CdrError
 from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Values, values_of
 from automax_ros.messages.types.topics import QosProfile
 from automax_ros.rack.base.stop_cause import StopCause
-from automax_ros.rack.distributed.link import Batch, HeldForce, Picture, Standing
-from automax_ros.rack.distributed.versions import Held
+from automax_ros.rack.distributed.link import Batch, HeldForce, ImageCopy, StopState
+from automax_ros.rack.distributed.versions import VersionedValue
 
 AHEAD_NS = 60 * NS_PER_S
 """So far ahead of this process's time another's may be: clocks of hosts differ, and a process may have been held up."""
@@ -110,7 +110,7 @@ def batch_of(message: BusWrite, texts: Collection[int]) -> Batch:
     return Batch(message.seat, message.sequence, message.stamp, message.writer, kind, entries)
 
 
-def image_message(picture: Picture, now_ns: int, run_id: int, process: int, asked_by: int) -> BusImage:
+def image_message(picture: ImageCopy, now_ns: int, run_id: int, process: int, asked_by: int) -> BusImage:
     """Return what a process holds as a message for the one that has asked."""
     values, forces = picture.values, picture.forces
     return BusImage(
@@ -134,7 +134,7 @@ def image_message(picture: Picture, now_ns: int, run_id: int, process: int, aske
     )
 
 
-def picture_of(message: BusImage, texts: Collection[int]) -> Picture:
+def picture_of(message: BusImage, texts: Collection[int]) -> ImageCopy:
     """Return what a process holds; ``texts`` are the views of STRING variables.
 
     Raises:
@@ -143,25 +143,27 @@ def picture_of(message: BusImage, texts: Collection[int]) -> Picture:
     try:
         since = zip(message.since_ns, message.seat, message.order, strict=True)
         values = zip(_entries(message.values, texts), message.mask, since, strict=True)
-        held = tuple(Held(view, element, value, mask, version) for (view, element, value), mask, version in values)
+        held = tuple(
+            VersionedValue(view, element, value, mask, version) for (view, element, value), mask, version in values
+        )
         keys = (message.force_variable, message.force_element, message.force_value, message.force_held)
         since = zip(message.force_since_ns, message.force_seat, message.force_order, strict=True)
         forces = tuple(HeldForce(*force) for force in zip(*keys, since, strict=True))
     except ValueError:
         raise CdrError("an image whose parts differ in length") from None
-    return Picture(message.sequence, held, forces)
+    return ImageCopy(message.sequence, held, forces)
 
 
-def standing_of(presence: Presence) -> Standing:
+def standing_of(presence: Presence) -> StopState:
     """Return how the rack stands by the word of a process."""
     cause = None
     if presence.stopped:
         code = presence.stopped_code or None
         cause = StopCause(presence.standing_ns, presence.stopped_reason, code, presence.stopped_task)
-    return Standing(presence.standing_ns, presence.standing_seat, cause)
+    return StopState(presence.standing_ns, presence.standing_seat, cause)
 
 
-def with_standing(presence: Presence, standing: Standing) -> Presence:
+def with_standing(presence: Presence, standing: StopState) -> Presence:
     """Return a process's word with how the rack stands."""
     cause = standing.cause
     return presence._replace(

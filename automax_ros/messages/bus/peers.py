@@ -24,7 +24,7 @@ HELD_UP_NS = 45 * NS_PER_MS
 """Who was held up for so long itself judges nobody until it has heard what came meanwhile."""
 
 
-class Heard(enum.Enum):
+class PresenceVerdict(enum.Enum):
     """What a process's word means."""
 
     OWN = "own"
@@ -94,7 +94,7 @@ class Peers:
     lives: Callable[[Presence], bool | None] = lambda _: None
     _looked_ns: int = 0
 
-    def heard(self, presence: Presence, now_ns: int) -> Heard:
+    def heard(self, presence: Presence, now_ns: int) -> PresenceVerdict:
         """Take a process's word."""
         refused = self._refused(presence)
         if refused is not None:
@@ -108,9 +108,9 @@ class Peers:
             # What it sent before it was heard has not been taken: the first batch that it tells of is owed.
             self.by_seat[presence.seat] = peer = Peer(presence, now_ns)
             self.lost.discard(presence.seat)
-            found = Heard.NEW
+            found = PresenceVerdict.NEW
         else:
-            peer.presence, peer.heard_ns, found = presence, now_ns, Heard.KNOWN
+            peer.presence, peer.heard_ns, found = presence, now_ns, PresenceVerdict.KNOWN
         return found
 
     def is_short(self, presence: Presence) -> bool:
@@ -131,15 +131,15 @@ class Peers:
         peer = self.by_seat.get(presence.seat)
         return peer if peer is not None and peer.presence is presence and presence.sequence > peer.received else None
 
-    def _refused(self, presence: Presence) -> Heard | None:
+    def _refused(self, presence: Presence) -> PresenceVerdict | None:
         if presence.process == self.process:
-            return Heard.OWN
+            return PresenceVerdict.OWN
         if presence.run_id and self.run_id and presence.run_id != self.run_id:
-            return Heard.OTHER_RUN
+            return PresenceVerdict.OTHER_RUN
         if presence.fingerprint != self.fingerprint:
-            return Heard.OTHER_FILE
+            return PresenceVerdict.OTHER_FILE
         if set(presence.slots) & set(self.slots):
-            return Heard.SEAT_TAKEN
+            return PresenceVerdict.SEAT_TAKEN
         return None
 
     def look(self, now_ns: int) -> list[Peer]:

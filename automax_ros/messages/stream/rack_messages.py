@@ -165,7 +165,7 @@ class RackMessages:
                 variable.type.number,
                 variable.dimensions,
                 variable.length,
-                slots.get(number, config.home_slot),
+                slots.get(number, config.common_memory_slot),
                 variable.non_volatile,
                 variable.direction,
                 f"/{config.namespace}/{topics[variable.name]}" if variable.direction is not Direction.CLOSED else "",

@@ -71,7 +71,7 @@ class RackStream:
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
         slots = [module.config.slot for module in rack.task_modules]
         # Where common memory is in another process the first module with tasks says what is done here.
-        teller = None if rack.part.is_home else next(iter(slots), None)
+        teller = None if rack.part.holds_common_memory else next(iter(slots), None)
         self.operations_topic = Topic(f"{space}/operations", "automax_msgs/msg/Operation", OPERATION, teller)
         self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
         self.scans_topics = {slot: Topic(f"{space}/scans", "automax_msgs/msg/Scan", SCAN, slot) for slot in slots}
@@ -98,7 +98,7 @@ class RackStream:
     @property
     def topics(self) -> list[Topic]:
         """All topics of the stream: of the part of the rack that is in this process."""
-        if not self._rack.part.is_home:
+        if not self._rack.part.holds_common_memory:
             return [*self.module_topics, *self.plants.topics]
         rack = [self.variables_topic, self.snapshot_topic, self.backplane_topic, self.operations_topic]
         values = (value.topic for value in self._values.values())

@@ -22,7 +22,7 @@ from librt.strings import BytesWriter, write_i32_le, write_i64_le
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Latched, Value
 from automax_ros.messages.cdr.cdr import CdrError, encoder
-from automax_ros.messages.stream.templates import Patterns, Prepared, prepared
+from automax_ros.messages.stream.templates import MessageTemplate, TemplateCache, prepared
 from automax_ros.messages.types.messages import (
     HELD_MARK,
     NAMES,
@@ -92,9 +92,9 @@ class TaskMessages:
         self._fields = [field.name for field in layout.fields]
         self._sizes = [field.size for field in layout.fields]
         self._latched: Latched | None = None
-        self._scans, self._scans_by_length = Patterns(), Patterns()
-        self._quiet: Prepared | None = None
-        self._alike_states: Prepared | None = None
+        self._scans, self._scans_by_length = TemplateCache(), TemplateCache()
+        self._quiet: MessageTemplate | None = None
+        self._alike_states: MessageTemplate | None = None
         self._encode_scan, self._encode_state = encoder(NAMES[Scan]), encoder(NAMES[TaskState])
 
     def scan(self, record: ScanRecord, stamp: int, *, full: bool) -> Scan:
@@ -261,7 +261,7 @@ class TaskMessages:
     def _learnt(
         self,
         key: Hashable,
-        patterns: Patterns,
+        patterns: TemplateCache,
         groups: Sequence[Sequence[str]],
         record: ScanRecord,
         stamp: int,

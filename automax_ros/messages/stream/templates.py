@@ -23,7 +23,7 @@ from automax_ros.messages.types.definitions import TIME, Field, message_types
 from automax_ros.messages.types.messages import NAMES
 
 
-class Prepared:
+class MessageTemplate:
     """What packs messages that are like one but for some fields.
 
     ``pack`` takes the first of ``constants``, the numbers of the first group that varies, the second constant, those of
@@ -55,10 +55,10 @@ class _Builder:
         for field, value in zip(message_types()[type_name].definition.fields, message, strict=True):
             self._add_field(field, value, self._group_of.get(prefix + field.name, -1), f"{prefix}{field.name}.")
 
-    def finish(self) -> Prepared:
+    def finish(self) -> MessageTemplate:
         """Return the outcome."""
         self._cut()
-        return Prepared(struct.Struct(f"<{self._format}").pack, tuple(self._constants))
+        return MessageTemplate(struct.Struct(f"<{self._format}").pack, tuple(self._constants))
 
     def _add_field(self, field: Field, value: Any, group: int, prefix: str) -> None:
         if field.kind == TIME:
@@ -127,7 +127,7 @@ class _Builder:
         self._fixed, self._values = "", []
 
 
-def prepared(message: Message, *groups: Sequence[str]) -> Prepared:
+def prepared(message: Message, *groups: Sequence[str]) -> MessageTemplate:
     """Return what packs messages that are like one but for the numbers in some fields.
 
     Args:
@@ -154,15 +154,15 @@ MOST_PATTERNS = 2048
 """Most patterns that are known at a time: an array's elements in turn would make ever more."""
 
 
-class Patterns:
+class TemplateCache:
     """The patterns of one kind of message. ``known`` has those that are prepared, by key."""
 
     def __init__(self) -> None:
         """Know none."""
-        self.known: dict[Hashable, Prepared] = {}
+        self.known: dict[Hashable, MessageTemplate] = {}
         self._seen: dict[Hashable, int] = {}
 
-    def learn(self, key: Hashable, prepare: Callable[[], Prepared]) -> None:
+    def learn(self, key: Hashable, prepare: Callable[[], MessageTemplate]) -> None:
         """Note that a message with a key was packed by the codec."""
         times = self._seen.get(key, 0) + 1
         if times < ENOUGH_TIMES:

@@ -9,7 +9,7 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.messages.cdr.cdr import CdrError, encoder
-from automax_ros.messages.stream.templates import Patterns, prepared
+from automax_ros.messages.stream.templates import TemplateCache, prepared
 from automax_ros.messages.types.messages import NAMES, CommonWrite, values_of
 from automax_ros.runtime.memory.views import WriteGroup
 
@@ -26,7 +26,7 @@ class WriteMessages:
         """Begin with the numbering."""
         self.sequence = 0
         self._slots = slots
-        self._patterns = Patterns()
+        self._patterns = TemplateCache()
         self._encode = encoder(NAMES[CommonWrite])
 
     def message(

@@ -44,9 +44,9 @@ class RackPart:
         return len(self.slots) == len(self.config.modules)
 
     @property
-    def is_home(self) -> bool:
+    def holds_common_memory(self) -> bool:
         """Whether common memory is in this process: it serves the rack's commons, tables and operators."""
-        return self.config.home_slot in self.slots
+        return self.config.common_memory_slot in self.slots
 
     @property
     def modules(self) -> list[ModuleConfig]:
@@ -86,7 +86,7 @@ class RackPart:
         slots = {item.name: item.slot for item in driven_plants(self.config)}
         found = []
         for plant in self.config.plants:
-            driving = {slots[name] for name in coupled[plant.name] if name in slots} or {self.config.home_slot}
+            driving = {slots[name] for name in coupled[plant.name] if name in slots} or {self.config.common_memory_slot}
             if driving & self.slots:
                 found.append(plant)
         return found

@@ -21,7 +21,7 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import StopCause
-from automax_ros.rack.distributed.versions import AS_INSTALLED, TAKEN, Held, Key, Version, Versions, merged
+from automax_ros.rack.distributed.versions import AS_INSTALLED, TAKEN, Key, Version, VersionedValue, Versions, merged
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.writers import PRESET_WRITER
 from automax_ros.runtime.memory.registers import Part
@@ -65,16 +65,16 @@ class HeldForce:
 
 
 @dataclass(frozen=True)
-class Picture:
+class ImageCopy:
     """All that was written since the rack's start, as one image holds it after its own batch ``sequence``."""
 
     sequence: int
-    values: tuple[Held, ...]
+    values: tuple[VersionedValue, ...]
     forces: tuple[HeldForce, ...]
 
 
 @dataclass(frozen=True)
-class Standing:
+class StopState:
     """How the whole rack stands: stopped for ``cause`` or not (None), and from when that counts."""
 
     at_ns: int = 0
@@ -87,7 +87,7 @@ class Standing:
         return self.at_ns, self.seat
 
 
-class BusLink:
+class ImageSync:
     """The link of one process. ``seat`` is the slot that names it; ``standing`` is how the rack stands as it knows it.
 
     ``send`` gets each batch as soon as it is there; it may not write to the rack. ``is_common`` says whether what
@@ -109,7 +109,7 @@ class BusLink:
         self._versions = Versions(rack.memory.registers)
         self._forces: dict[Key, tuple[Version, bool, Value]] = {}
         self.sequence = 0
-        self.standing = Standing()
+        self.standing = StopState()
         self.starting = True
         self._adopting = False
         self._waiting: dict[ScheduledEvent, Callable[[], None]] = {}
@@ -138,8 +138,8 @@ class BusLink:
         cause = self._rack.operations.stopped
         if not self._adopting and cause != self.standing.cause:
             # Two at one instant, or before the start, have their order too.
-            seat = self._rack.config.home_slot if self._is_common() else self.seat
-            self.standing = Standing(max(operation.at_ns, self.standing.at_ns + 1), seat, cause)
+            seat = self._rack.config.common_memory_slot if self._is_common() else self.seat
+            self.standing = StopState(max(operation.at_ns, self.standing.at_ns + 1), seat, cause)
 
     # from other processes
 
@@ -153,19 +153,19 @@ class BusLink:
         key = _AFTER_SCANS if by_scan else _BEFORE_SCANS
         self._in_time(batch.time_ns, key, lambda: self._receive(batch))
 
-    def merge(self, picture: Picture) -> None:
+    def merge(self, picture: ImageCopy) -> None:
         """Take over what another process holds, as far as it is newer. Between two scans, in time as ``receive``."""
         written_ns = [held.version[0] for held in picture.values] + [force.version[0] for force in picture.forces]
         self._in_time(max(written_ns, default=0), _BEFORE_SCANS, lambda: self._merge(picture))
 
-    def picture(self) -> Picture:
+    def picture(self) -> ImageCopy:
         """Return all that was written, for a process that joins or has missed a batch."""
         self._collect()
         forces = (
             HeldForce(view, element, value, held, version)
             for (view, element), (version, held, value) in self._forces.items()
         )
-        return Picture(self.sequence, tuple(self._versions.all()), tuple(forces))
+        return ImageCopy(self.sequence, tuple(self._versions.all()), tuple(forces))
 
     def take_waiting(self) -> None:
         """Take at once what waits for its time: nothing that was written is lost where the rack or its run ends."""
@@ -174,7 +174,7 @@ class BusLink:
             event.cancel()
             self._guard(take)
 
-    def last_of(self, seat: int) -> Picture:
+    def last_of(self, seat: int) -> ImageCopy:
         """Return what a process has written within the last second, as this image holds it, for all others.
 
         Where it has ended in the middle of sending some have its last batch and others do not.
@@ -183,9 +183,9 @@ class BusLink:
         whole, since_ns = self.picture(), self._rack.now_ns - NS_PER_S
         values = tuple(held for held in whole.values if held.version[1] == seat and held.version[0] >= since_ns)
         forces = tuple(force for force in whole.forces if force.version[1] == seat and force.version[0] >= since_ns)
-        return Picture(whole.sequence, values, forces)
+        return ImageCopy(whole.sequence, values, forces)
 
-    def adopt(self, standing: Standing) -> None:
+    def adopt(self, standing: StopState) -> None:
         """Follow the rack into how it stands by another process's word, if that is newer. Between two scans.
 
         A part that stands already is not stopped again, which would clear what was set meanwhile (decision).
@@ -237,7 +237,7 @@ class BusLink:
             if sent.get(entry[:2], cause.value) != cause.value:
                 self._note(max(cause.time_ns, batch.time_ns + 1), cause.writer, WriteKind(cause.kind), (entry,))
 
-    def _merge(self, picture: Picture) -> None:
+    def _merge(self, picture: ImageCopy) -> None:
         self._collect()
         self._memory.now_ns = self._rack.now_ns
         for held in picture.values:
@@ -259,7 +259,7 @@ class BusLink:
         else:
             self._write_bits(fit.rest, batch.writer, batch.kind)
 
-    def _take_held(self, held: Held) -> None:
+    def _take_held(self, held: VersionedValue) -> None:
         if held.view in self._memory.registers.views:
             self._write_bits(self._versions.settle_bits(held), PRESET_WRITER, WriteKind.OUTSIDE)
             return
@@ -313,14 +313,14 @@ class BusLink:
     def _note(self, time_ns: int, writer: int, kind: WriteKind, entries: Iterable[tuple[int, int, Value]]) -> None:
         preset = self.starting and writer == PRESET_WRITER
         common = preset or self._is_common()
-        sends = not preset and (not common or self._rack.part.is_home)
+        sends = not preset and (not common or self._rack.part.holds_common_memory)
         if sends:
             self.sequence += 1
         if self._adopting:  # what a STOP ALL clears here is not older than the STOP ALL
             time_ns = max(time_ns, self.standing.at_ns)
-        home = self._rack.config.home_slot
+        home = self._rack.config.common_memory_slot
         version = AS_INSTALLED if preset else (time_ns, home, 0) if common else (time_ns, self.seat, self.sequence)
-        repairs: list[Part | Held] = []
+        repairs: list[Part | VersionedValue] = []
         sent = []
         for view, element, value in entries:
             if kind in _FORCES:
@@ -345,12 +345,12 @@ class BusLink:
         else:
             self._memory.release(force.view, force.element, PRESET_WRITER)
 
-    def _repair(self, repairs: Iterable[Part | Held]) -> None:
+    def _repair(self, repairs: Iterable[Part | VersionedValue]) -> None:
         """Put back what is newer than what was written here."""
         memory = self._memory
         memory.now_ns = self._rack.now_ns
         for item in repairs:
-            if isinstance(item, Held):
+            if isinstance(item, VersionedValue):
                 memory.write_now(item.view, item.value, PRESET_WRITER, item.element, WriteKind.OUTSIDE)
             else:
                 word = merged(int(memory.read_now(item.bank, item.register)), [item])

@@ -22,7 +22,7 @@ Key = tuple[int, int]
 """View and element."""
 
 
-class Held(NamedTuple):
+class VersionedValue(NamedTuple):
     """A value and from when it counts; of a register, the bits of ``mask``."""
 
     view: int
@@ -33,7 +33,7 @@ class Held(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Fit:
+class MergeResult:
     """What an image makes of a write: ``whole`` to be taken as it is; else ``rest`` is what to write in its place.
 
     ``rest`` are the registers (view of the bank, register, bits, mask) that are newer than what is held.
@@ -43,8 +43,8 @@ class Fit:
     rest: tuple[Part, ...] = ()
 
 
-TAKEN = Fit(whole=True)
-REFUSED = Fit(whole=False)
+TAKEN = MergeResult(whole=True)
+REFUSED = MergeResult(whole=False)
 
 
 class Versions:
@@ -56,7 +56,7 @@ class Versions:
         self._plain: dict[Key, tuple[Version, Value]] = {}
         self._bits: dict[Key, list[tuple[int, int, Version]]] = {}
 
-    def settle(self, view: int, element: int, value: Value, version: Version) -> Fit:
+    def settle(self, view: int, element: int, value: Value, version: Version) -> MergeResult:
         """Compare a write with what is held, and note it as far as it is newer or as new."""
         if view not in self._registers.views:
             held = self._plain.get((view, element))
@@ -68,32 +68,32 @@ class Versions:
         rest = [part._replace(mask=self._settle_bits(part, version)) for part in parts]
         if all(new.mask == part.mask for new, part in zip(rest, parts, strict=True)):
             return TAKEN
-        return Fit(whole=False, rest=tuple(part for part in rest if part.mask))
+        return MergeResult(whole=False, rest=tuple(part for part in rest if part.mask))
 
-    def settle_bits(self, held: Held) -> tuple[Part, ...]:
+    def settle_bits(self, held: VersionedValue) -> tuple[Part, ...]:
         """Note what another image holds of a register, as far as it is newer; return what to write, if anything."""
         part = Part(held.view, held.element, int(held.value) & WORD, held.mask & WORD)
         mask = self._settle_bits(part, held.version)
         return (part._replace(mask=mask),) if mask else ()
 
-    def newest(self, view: int, element: int, value: Value) -> Iterator[Part | Held]:
+    def newest(self, view: int, element: int, value: Value) -> Iterator[Part | VersionedValue]:
         """Yield what is held where a write of this process came too late, to be put back."""
         if view not in self._registers.views:
             version, held = self._plain[view, element]
-            yield Held(view, element, held, WORD, version)
+            yield VersionedValue(view, element, held, WORD, version)
             return
         for part in self._registers.parts(view, element, value):
             for mask, bits, _ in self._bits.get((part.bank, part.register), ()):
                 if mask & part.mask:
                     yield Part(part.bank, part.register, bits, mask & part.mask)
 
-    def all(self) -> Iterator[Held]:
+    def all(self) -> Iterator[VersionedValue]:
         """Yield everything that was written, for an image that another process takes over."""
         for (view, element), (version, value) in self._plain.items():
-            yield Held(view, element, value, WORD, version)
+            yield VersionedValue(view, element, value, WORD, version)
         for (view, element), pieces in self._bits.items():
             for mask, bits, version in pieces:
-                yield Held(view, element, bits, mask, version)
+                yield VersionedValue(view, element, bits, mask, version)
 
     def _settle_bits(self, part: Part, version: Version) -> int:
         """Note the bits of a register that are newer; return which."""

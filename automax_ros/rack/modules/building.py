@@ -8,7 +8,7 @@ from typing import Any
 from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.modules.drive_io import DriveAnalogModule
 from automax_ros.rack.modules.io_module import IoModule
-from automax_ros.rack.modules.module import Module, Parts, QuietModule
+from automax_ros.rack.modules.module import Module, QuietModule, RackServices
 from automax_ros.rack.modules.network import NetworkModule
 from automax_ros.rack.modules.processor import ProcessorModule
 from automax_ros.rack.modules.udc import UdcModule
@@ -21,35 +21,35 @@ from automax_ros.rackfile.modules.processor import Pc3000Config, ProcessorConfig
 from automax_ros.rackfile.modules.udc import UdcConfig
 
 
-def build_module(config: ModuleConfig, parts: Parts) -> Module:
+def build_module(config: ModuleConfig, parts: RackServices) -> Module:
     """Return the module of a running rack that a configuration describes."""
     return _BUILDERS[type(config)](config, parts)
 
 
-def _processor(config: ProcessorConfig, parts: Parts) -> Module:
+def _processor(config: ProcessorConfig, parts: RackServices) -> Module:
     in_order = sorted(config.tasks, key=lambda item: (item.priority, item.name))
     execution = parts.execution(config.name)
     return ProcessorModule(config, [parts.install(item, execution) for item in in_order])
 
 
-def _drive(config: DriveConfig, parts: Parts) -> Module:
+def _drive(config: DriveConfig, parts: RackServices) -> Module:
     plant = None if config.plant is None else parts.plants.get(config.plant.name)
     full_rpm = None if config.plant is None else parts.full_speeds.get(config.plant.name)
     return DriveControllerModule(config, parts, plant, full_rpm)
 
 
-def _drive_analog(config: DriveAnalogConfig, parts: Parts) -> Module:
+def _drive_analog(config: DriveAnalogConfig, parts: RackServices) -> Module:
     module = DriveAnalogModule(config, parts)
     if config.drive is not None:
         parts.drives.wire_voltage(config.drive, module.feel)
     return module
 
 
-def _network(config: NetworkConfig, parts: Parts) -> Module:
+def _network(config: NetworkConfig, parts: RackServices) -> Module:
     return NetworkModule(config, config.network, config.drop, parts)
 
 
-_BUILDERS: dict[type, Callable[[Any, Parts], Module]] = {
+_BUILDERS: dict[type, Callable[[Any, RackServices], Module]] = {
     ProcessorConfig: _processor,
     Pc3000Config: _processor,
     CommonMemoryConfig: lambda config, _: QuietModule(config),

@@ -31,7 +31,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.text import count_of
@@ -48,7 +48,7 @@ from automax_ros.drive.current_loop.signals import (
 from automax_ros.drive.plant.controller import DriveController
 from automax_ros.drive.plant.plant import DrivePlant
 from automax_ros.rack.modules.drive_io import DriveDigital
-from automax_ros.rack.modules.module import ModuleState, Parts
+from automax_ros.rack.modules.module import ModuleState, RackServices
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.drive import ACCESS_NS, DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
@@ -239,7 +239,7 @@ class DriveControllerModule:
     tasks: Sequence[ScheduledTask] = ()
 
     def __init__(
-        self, config: ModuleConfig, parts: Parts, plant: DrivePlant | None, full_rpm: float | None = None
+        self, config: ModuleConfig, parts: RackServices, plant: DrivePlant | None, full_rpm: float | None = None
     ) -> None:
         """Attach itself to the rack's drives; nothing happens before a task arms it.
 
@@ -449,11 +449,3 @@ class DriveControllerModule:
             if feedback is not None:
                 feedback(plant.circuit.armature_v, plant.data.parameters.line_v)
                 self._parts.tell_writes()
-
-
-@runtime_checkable
-class Timed(Protocol):
-    """A module that counts how its interrupts keep their time."""
-
-    @property
-    def timing(self) -> InterruptTiming: ...  # noqa: D102

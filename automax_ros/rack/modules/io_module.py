@@ -14,7 +14,7 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
 from automax_ros.core.ticks import CLOCK_PERIOD_NS
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.modules.module import ModuleState, Parts
+from automax_ros.rack.modules.module import ModuleState, RackServices
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.module import Interrupt, ModuleConfig
 from automax_ros.runtime.memory.process_inputs import Freezer
@@ -28,7 +28,7 @@ class IoModule:
 
     tasks: Sequence[ScheduledTask] = ()
 
-    def __init__(self, config: ModuleConfig, parts: Parts) -> None:
+    def __init__(self, config: ModuleConfig, parts: RackServices) -> None:
         """Take a module's configuration; nothing happens before the clock is turned on."""
         bank = parts.backplane.bank(config.slot)
         assert bank is not None
@@ -124,7 +124,7 @@ class IoModule:
 class _PeriodicInterrupt:
     """One interrupt of a module, with the inputs that freeze at it."""
 
-    def __init__(self, slot: int, bank: int, interrupt: Interrupt, parts: Parts) -> None:
+    def __init__(self, slot: int, bank: int, interrupt: Interrupt, parts: RackServices) -> None:
         assert interrupt.period is not None
         self.status = interrupt.status
         self._bank, self._period, self._enable, self._parts = bank, interrupt.period, interrupt.enable, parts

@@ -48,7 +48,7 @@ class Install(Protocol):
 
 
 @dataclass(frozen=True)
-class Parts:
+class RackServices:
     """What a rack gives to its modules.
 
     ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them. ``tell_writes`` tells

@@ -25,8 +25,8 @@ from functools import partial
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
-from automax_ros.rack.modules.module import ModuleState, Parts
-from automax_ros.rack.modules.network_drops import Frame, Hearing, NetworkStatus, Send, Sender
+from automax_ros.rack.modules.module import ModuleState, RackServices
+from automax_ros.rack.modules.network_drops import DropMessage, Hearing, NetworkStatus, Send, Sender
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.network import (
@@ -72,7 +72,7 @@ class NetworkModule:
 
     tasks: Sequence[ScheduledTask] = ()
 
-    def __init__(self, config: ModuleConfig, network: str, drop: int, parts: Parts) -> None:
+    def __init__(self, config: ModuleConfig, network: str, drop: int, parts: RackServices) -> None:
         """Take a module's configuration; nothing happens before the power comes."""
         bank = parts.backplane.bank(config.slot)
         assert bank is not None
@@ -98,7 +98,7 @@ class NetworkModule:
         """Let what it sends be carried from now on."""
         self._send = send
 
-    def receive(self, frames: Iterable[tuple[Sender, Frame]], damaged: int = 0) -> None:
+    def receive(self, frames: Iterable[tuple[Sender, DropMessage]], damaged: int = 0) -> None:
         """Take frames of others, between two scans, and count those that arrived but could not be read."""
         if self._event is None:
             return
@@ -262,12 +262,12 @@ class NetworkModule:
             return self._own
         return [MASTER, *sorted({*self._named, *self._written})]
 
-    def _frame(self, drop: int) -> Frame:
+    def _frame(self, drop: int) -> DropMessage:
         numbers = from_master(drop) if self._is_master else from_slave(drop)
         words = tuple(sign_extended(self._read(number), 16) for number in numbers)
-        return Frame(self._drop, self._depth, self._defined, drop, self._sequence % (1 << 32), words)
+        return DropMessage(self._drop, self._depth, self._defined, drop, self._sequence % (1 << 32), words)
 
-    def _take(self, sender: Sender, frame: Frame) -> None:
+    def _take(self, sender: Sender, frame: DropMessage) -> None:
         """Take a sound frame: that of the other side, or of a rival that uses drops of this module."""
         from_the_master = frame.station == MASTER
         if self._is_master == from_the_master:
@@ -287,7 +287,7 @@ class NetworkModule:
         """Return 0 where the master that is heard has sent it: only its broadcast frame shows missed cycles."""
         return 0 if self._hearing.drops[MASTER].is_heard and self._hearing.drops[MASTER].sender == sender else None
 
-    def _accept(self, frame: Frame, registers: range, missed: int | None) -> None:
+    def _accept(self, frame: DropMessage, registers: range, missed: int | None) -> None:
         if missed is None:
             return
         self._count["received"] += 1

@@ -19,7 +19,7 @@ from automax_ros.rackfile.modules.network import HALF, LAST_DROP, MASTER, greate
 
 
 @dataclass(frozen=True)
-class Frame:
+class DropMessage:
     """The registers that one station sends of one drop, once per cycle.
 
     ``station`` is the drop of the sender, ``depth`` how many drops it represents and ``defined`` whether a task has
@@ -65,7 +65,7 @@ class Sender:
         return f"rack {self.rack or '?'} slot {self.slot}"
 
 
-Send = Callable[[int, Sequence[Frame]], None]
+Send = Callable[[int, Sequence[DropMessage]], None]
 """Carries what a module sends: rack time (ns), the frames of a cycle."""
 
 
@@ -100,7 +100,7 @@ class Station(Protocol):
         """Let what it sends be carried from now on."""
         ...
 
-    def receive(self, frames: Iterable[tuple[Sender, Frame]], damaged: int = 0) -> None:
+    def receive(self, frames: Iterable[tuple[Sender, DropMessage]], damaged: int = 0) -> None:
         """Take frames of others, between two scans, and count those that arrived but could not be read."""
         ...
 
@@ -150,7 +150,7 @@ class Hearing:
         self.drops = {drop: Drop() for drop in self._awaited}
         self.rivals = {}
 
-    def take(self, sender: Sender, frame: Frame) -> int | None:
+    def take(self, sender: Sender, frame: DropMessage) -> int | None:
         """Take in whose frame it is; return how many frames of the drop were missed, None where it is a rival's."""
         known = self.drops.setdefault(frame.drop, Drop())
         if known.is_heard and known.sender != sender:

@@ -20,7 +20,7 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType
 from automax_ros.language.program import Program, lines_that_write
 from automax_ros.language.tree.tree import Scope
-from automax_ros.rack.modules.module import ModuleState, Parts
+from automax_ros.rack.modules.module import ModuleState, RackServices
 from automax_ros.rack.modules.udc_pmi import UdcPmis
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rack.tasks.triggers import Due
@@ -134,7 +134,7 @@ class _Trigger:
 class UdcModule:
     """A UDC with its tasks, in the order of their drives."""
 
-    def __init__(self, config: ModuleConfig, parts: Parts) -> None:
+    def __init__(self, config: ModuleConfig, parts: RackServices) -> None:
         """Install the tasks; nothing happens before the common clock runs."""
         bank = parts.backplane.bank(config.slot)
         assert bank is not None

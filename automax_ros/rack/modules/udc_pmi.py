@@ -14,7 +14,7 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.drive.base.errors import DriveError
 from automax_ros.drive.pmi import registers as table
 from automax_ros.drive.pmi.pmi import Commands, Pmi
-from automax_ros.rack.modules.module import ModuleState, Parts
+from automax_ros.rack.modules.module import ModuleState, RackServices
 from automax_ros.rackfile.model.driven import Driving
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.udc import RAIL_COUNTERS
@@ -24,7 +24,7 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEv
 class UdcPmis:
     """The PMIs of one UDC: one for each drive that has a plant with a motor."""
 
-    def __init__(self, config: ModuleConfig, parts: Parts, bank: int, commanded: Callable[[str], bool]) -> None:
+    def __init__(self, config: ModuleConfig, parts: RackServices, bank: int, commanded: Callable[[str], bool]) -> None:
         """Connect the PMIs; ``commanded`` says of a drive whether a task scans that commands it."""
         plants = config.plants if isinstance(config, Driving) else {}
         self._name, self._parts, self._bank, self._commanded = config.name, parts, bank, commanded

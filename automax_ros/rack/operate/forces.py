@@ -33,7 +33,7 @@ class Force:
     under: Value | None = None
 
 
-class Forcing:
+class ForceTable:
     """Forces the variables of one rack, within what its Executive allows."""
 
     def __init__(self, config: RackConfig, memory: CommonMemory, tasks: Callable[[], Sequence[Task]]) -> None:

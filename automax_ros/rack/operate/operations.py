@@ -17,8 +17,8 @@ from automax_ros.core.types import Value
 from automax_ros.rack.base.observers import Observers, Operation
 from automax_ros.rack.base.stop_cause import KEEP_STATE, OperationRefused, OperationsState, PowerReturn, StopCause
 from automax_ros.rack.modules.module import Module
-from automax_ros.rack.operate.forces import Forcing
-from automax_ros.rack.tasks.installation import Installation, Prepared, RackError
+from automax_ros.rack.operate.forces import ForceTable
+from automax_ros.rack.tasks.installation import Installation, PreparedReload, RackError
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.writers import PRESET_WRITER
@@ -68,7 +68,7 @@ class Operations:
         events: Events,
         channels: Channels,
         observers: Observers,
-        forcing: Forcing,
+        forcing: ForceTable,
         elsewhere: frozenset[tuple[int, int]] = frozenset(),
     ) -> None:
         """Take the parts of a rack; ``elsewhere`` (views and elements) are modules' of other processes: not cleared."""
@@ -215,7 +215,7 @@ class Operations:
         """
         self._refuse_critical("reload", self.find("reload", name))
 
-    def install(self, prepared: Prepared, *, keep_state: bool = False) -> None:
+    def install(self, prepared: PreparedReload, *, keep_state: bool = False) -> None:
         """Do what is left of a ``reload`` whose source was prepared, while no other task was reloaded since.
 
         Raises:

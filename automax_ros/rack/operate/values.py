@@ -15,7 +15,7 @@ from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 from automax_ros.rack.base.observers import Observers, Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operate.forces import Forcing
+from automax_ros.rack.operate.forces import ForceTable
 from automax_ros.rack.operate.operations import Operations
 from automax_ros.rackfile.model.config import CommonElement, RackConfig
 from automax_ros.rackfile.model.value_names import common_named
@@ -32,7 +32,7 @@ _UNTOLD = ""
 """The name of an operation that observers are not told of."""
 
 
-class Adjustments:
+class ValueOperations:
     """Adjusts the values of one rack, between scans. ``forcing`` has the force table."""
 
     def __init__(
@@ -41,7 +41,7 @@ class Adjustments:
         operations: Operations,
         memory: CommonMemory,
         inputs: ProcessInputs,
-        forcing: Forcing,
+        forcing: ForceTable,
         scheduler: Scheduler,
         observers: Observers,
         tune: Tune,

@@ -20,7 +20,7 @@ MOST_CHARACTERS = 100
 """Longest text of a value that is looked at (decision: a bound on what strangers send)."""
 
 
-class Controls:
+class SwitchOperations:
     """The controls of one rack.
 
     Raises:

@@ -24,9 +24,9 @@ from automax_ros.core.types import DataType, Value, type_of_name
 from automax_ros.core.values import source_text, value_of, wanted
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.tasks.installation import Prepared, RackError
+from automax_ros.rack.tasks.installation import PreparedReload, RackError
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.reading.files import MAX_BYTES
@@ -46,7 +46,7 @@ class ReloadRefused(OperationRefused):
         self.findings = tuple(findings)
 
 
-class Orders:
+class OperatorRequests:
     """Carries out what is asked of one rack.
 
     Raises:
@@ -121,13 +121,13 @@ class Orders:
         """Move a control of the module in a slot: ``7``, ``test_switch``, ``A``."""
         for text in (slot, control, value):
             self._short("module", text, MAX_NAME)
-        Controls(self._rack).module(slot.strip(), control.strip(), value.strip())
+        SwitchOperations(self._rack).module(slot.strip(), control.strip(), value.strip())
 
     def plant(self, name: str, verb: str, value: str) -> None:
         """Break, mend or load a plant: ``UNWIND``, ``short_scr``, ``3``."""
         for text in (name, verb, value):
             self._short("plant", text, MAX_NAME)
-        Controls(self._rack).plant(name.strip().upper(), verb.strip(), value.strip())
+        SwitchOperations(self._rack).plant(name.strip().upper(), verb.strip(), value.strip())
 
     def reload(self, task: str, source: str, *, keep_state: bool = False) -> list[str]:
         """Replace a task's source by a text; return what its check found, short of errors.
@@ -149,15 +149,15 @@ class Orders:
         self._rack.operations.admit_reload(name)
         return name, SourceText(f"{name}{Path(self._rack.sources[name].name).suffix}", source)
 
-    def prepare(self, name: str, source: SourceText) -> Prepared:
+    def prepare(self, name: str, source: SourceText) -> PreparedReload:
         """Check and compile a source: second part of a reload, long; on any thread, while the rack scans."""
         return self._rack.operations.installation.prepare(name, source)
 
-    def is_current(self, prepared: Prepared) -> bool:
+    def is_current(self, prepared: PreparedReload) -> bool:
         """Return whether a source was prepared for the tasks as they are now; else it is prepared again."""
         return self._rack.operations.installation.is_current(prepared)
 
-    def install(self, prepared: Prepared, *, keep_state: bool = False) -> str:
+    def install(self, prepared: PreparedReload, *, keep_state: bool = False) -> str:
         """Let the task have its prepared source: last part of a reload, short.
 
         Returns in words which tuned values it has lost, "" where none: an installation takes them from the source.

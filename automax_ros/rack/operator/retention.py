@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.compile.base.layout import Role, StateField
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.names import NameFault, element_name
 from automax_ros.core.safe_file import replace_file
 from automax_ros.core.types import Value
@@ -107,7 +107,7 @@ Document = dict[str, Any]
 """All that is kept, as JSON has it."""
 
 
-class RetentionFault(Fault):
+class RetentionFault(UserError):
     """A state folder cannot be read or written, its file is damaged or another rack's, or it does not fit the rack."""
 
 
@@ -138,7 +138,9 @@ class Retention:
         """Take a rack that was not started; nothing is read or written yet."""
         self._rack = rack
         self.path = folder / _FILE
-        volatile = (not variable.non_volatile or not rack.part.is_home for variable in rack.config.variables)
+        volatile = (
+            not variable.non_volatile or not rack.part.holds_common_memory for variable in rack.config.variables
+        )
         self._views = [view for view, lost in enumerate(volatile) if not lost]
         self._registers = list(_kept_registers(rack))
         self._saved: Document = self._installed()
@@ -175,7 +177,7 @@ class Retention:
         tasks = {item.name: kept_task(item.task, hash_of(item.source.text)) for item in rack.scheduled}
         document: Document = {"format": FORMAT, "rack": rack.config.name, "commons": commons}
         document["registers"] = {name: value for name, value in self._present_registers() if value}
-        own = (item for item in rack.forces() if rack.part.is_home or "." in item.name)
+        own = (item for item in rack.forces() if rack.part.holds_common_memory or "." in item.name)
         document |= {"forced": {item.name: item.value for item in own}, "tasks": tasks}
         if rack.config.auto_run:
             document["status"] = self._statuses()

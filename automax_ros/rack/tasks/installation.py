@@ -15,7 +15,7 @@ from automax_ros.language.tree.task_kind import TaskKind
 from automax_ros.rackfile.checks.tasks import check_source, check_tasks, commons_of, findings_by_task, with_findings
 from automax_ros.rackfile.model.config import RackConfig, Timing
 from automax_ros.rackfile.model.module import ModuleConfig, cost_model
-from automax_ros.rackfile.processes import seats_of
+from automax_ros.rackfile.processes import processes_of
 
 Finding = tuple[SourceText, list[Diagnostic]]
 """What is wrong in which text."""
@@ -31,7 +31,7 @@ class RackError(Exception):
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedReload:
     """Another source for a task, checked and compiled, that may be installed.
 
     Attributes:
@@ -96,7 +96,7 @@ class Installation:
         self.native: Mapping[str, NativeOutcome] = self._native.made(self._compiled)
         self._compiled = {name: outcome.compiled for name, outcome in self.native.items()}
         distributed = len(self._compiled) < len(checked)
-        self._cut = seats_of(config, self._programs.values()) if distributed else ()
+        self._cut = processes_of(config, self._programs.values()) if distributed else ()
 
     def again(self, config: RackConfig) -> Installation:
         """Return the installation of another rack, which has the same tasks, modules and commons: nothing is compiled.
@@ -117,21 +117,21 @@ class Installation:
         """Return a task of the rack's file."""
         return self._compiled[task]
 
-    def prepare(self, task: str, source: SourceText) -> Prepared:
+    def prepare(self, task: str, source: SourceText) -> PreparedReload:
         """Check and compile another source for a task of the rack; any thread may, for nothing is changed."""
         among = self._programs
         try:
             program = self._checked(task, source, among)
             compiled = self._native.form(self._compile(task, program)).compiled
         except RackError as fault:
-            return Prepared(task, source, None, among, among, fault)
-        return Prepared(task, source, compiled, {**among, task: program}, among)
+            return PreparedReload(task, source, None, among, among, fault)
+        return PreparedReload(task, source, compiled, {**among, task: program}, among)
 
-    def is_current(self, prepared: Prepared) -> bool:
+    def is_current(self, prepared: PreparedReload) -> bool:
         """Return whether no task was reloaded since a source was checked against them."""
         return prepared.among is self._programs
 
-    def take(self, prepared: Prepared) -> CompiledTask:
+    def take(self, prepared: PreparedReload) -> CompiledTask:
         """Let a prepared source be the task's program, and return it compiled.
 
         Raises:
@@ -167,7 +167,7 @@ class Installation:
 
     def _refuse_bonds(self, task: str, source: SourceText, programs: Mapping[str, Program]) -> None:
         """Refuse a source with which modules of other processes would have to share this one (decision)."""
-        for seat in seats_of(self._config, programs.values()) if self._cut else ():
+        for seat in processes_of(self._config, programs.values()) if self._cut else ():
             if not any({*seat.slots} <= {*process.slots} for process in self._cut):
                 why = f"{seat.reasons[-1]}, so {' and '.join(seat.modules)} would have to share a process"
                 raise RackError(f"{source.name}: {why}: restart the rack with it; task {task} stays as it is")

@@ -16,7 +16,7 @@ from automax_ros.rack.base.observers import Observers
 from automax_ros.rack.tasks.statistics import TaskStatistics
 from automax_ros.rack.tasks.triggers import Due, MakeTrigger
 from automax_ros.runtime.memory.process_inputs import ProcessInputs
-from automax_ros.runtime.scan.execution import Execution, Ideal, Steps
+from automax_ros.runtime.scan.execution import Execution, IdealExecution, Steps
 from automax_ros.runtime.scan.scan_under_way import Progress
 from automax_ros.runtime.tasks.task import OVERLAP, ScanRecord, Status, Task
 from automax_ros.runtime.time.scheduler import Scheduler
@@ -79,7 +79,7 @@ class ScheduledTask:
         self._began_ns: int | None = None
         self._late_ns = 0
         self.trigger = trigger(task)
-        self.due: Due = self.whole if isinstance(execution, Ideal) else self._begin
+        self.due: Due = self.whole if isinstance(execution, IdealExecution) else self._begin
 
     @property
     def name(self) -> str:

@@ -171,7 +171,7 @@ class RackConfig:
         return [(module, task) for module in self.modules for task in module.tasks]
 
     @property
-    def home_slot(self) -> int:
+    def common_memory_slot(self) -> int:
         """The slot of the module that holds the common variables: the first that can."""
         return next((module.slot for module in self.modules if module.common_registers), 0)
 

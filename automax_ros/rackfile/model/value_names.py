@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.names import PREDEFINED, Element, NameFault, element
-from automax_ros.core.names import setting as core_setting
 from automax_ros.core.names import setting as named_setting
 from automax_ros.core.types import DataType, Value, bare_name
 from automax_ros.language.program import Program, Symbol, lines_that_write
@@ -27,7 +26,7 @@ def setting(config: RackConfig, text: str) -> tuple[str, Value]:
     Raises:
         Fault: not of that form, no such common, the value does not fit, or the rack itself writes that common (2.4.6).
     """
-    meant, value = core_setting(text, config.by_name, _ABSENT)
+    meant, value = named_setting(text, config.by_name, _ABSENT)
     if meant.name in PREDEFINED:
         raise NameFault(f"{meant.name} cannot be set: the rack itself writes it", "leave it out")
     return meant.label, value

@@ -32,7 +32,7 @@ def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
 
     A module with interrupts writes registers, and one that says so; no other does. Only plants with feeds write.
     """
-    home = config.home_slot
+    home = config.common_memory_slot
     outside = [
         WriterSpec(PRESET_WRITER, "rack", WriterKind.PRESET, home),
         WriterSpec(ROS_WRITER, "ros", WriterKind.ROS, home),

@@ -14,7 +14,7 @@ from automax_ros.compile.base.cost import Model
 from automax_ros.core.json_schema import Keys
 from automax_ros.rackfile.model.module import NO_REGISTERS, Registers
 from automax_ros.rackfile.model.task import TaskConfig
-from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 
 COMMON_REGISTERS = {"57C413": 65536, "57C423": 131072}
 """16-bit registers for common variables in slot 0 (J-3636 p. 1-1)."""
@@ -64,11 +64,11 @@ class CommonMemoryKind:
     models = dict.fromkeys(COMMON_REGISTERS, "common memory module")
     options: Keys = MappingProxyType({})
 
-    def read(self, found: FoundModule) -> CommonMemoryConfig:
+    def read(self, found: ModuleSection) -> CommonMemoryConfig:
         """Read the section, which has no keys of its own."""
         return CommonMemoryConfig(found.slot, found.model, found.span.line)
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Report common memory in an odd slot (J-3636 p. 1-1)."""
         for item in rack.of(self):
             if item.slot % 2:

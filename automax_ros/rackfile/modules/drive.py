@@ -22,7 +22,7 @@ from automax_ros.rackfile.model.config import MAX_SLOT
 from automax_ros.rackfile.model.module import Registers
 from automax_ros.rackfile.model.plants import plant_name
 from automax_ros.rackfile.modules.io import IoModel, WithoutTasks
-from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 from automax_ros.rackfile.reading.values import integer_value
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class DriveControllerKind:
     models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
     options: Keys = MappingProxyType({"plant": plant_name("The plant that the module drives.")})
 
-    def read(self, found: FoundModule) -> DriveConfig:
+    def read(self, found: ModuleSection) -> DriveConfig:
         """Read the plant."""
         node = found.section.get("plant")
         what = f"plant of {found.where}"
@@ -83,7 +83,7 @@ class DriveControllerKind:
             found.findings.add("AMX6522", f"{what}: the plant {plant.name} has no motor", node.span)
         return DriveConfig(found.slot, found.model, plant, found.span.line)
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Find nothing wrong: no source tells of a slot where a 57C406 may not stand."""
 
 
@@ -121,14 +121,14 @@ class DriveAnalogKind:
         {"drive": whole("Slot of the 57C406 whose armature voltage is wired to it.", 0, MAX_SLOT)}
     )
 
-    def read(self, found: FoundModule) -> DriveAnalogConfig:
+    def read(self, found: ModuleSection) -> DriveAnalogConfig:
         """Read which drive it is wired to."""
         node = found.section.get("drive")
         what = f"drive of {found.where}"
         drive = None if node is None else integer_value(node, what, found.findings, low=0, high=15, code="AMX6520")
         return DriveAnalogConfig(found.slot, found.model, drive, found.span.line, node.span if node else None)
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Report a drive that is not there, and one that has two of these modules."""
         controllers = {item.slot for item in rack.of(DRIVE_CONTROLLER)}
         wired: dict[int, Span] = {}

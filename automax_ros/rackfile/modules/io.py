@@ -43,7 +43,7 @@ from automax_ros.compile.base.cost import Model
 from automax_ros.core.json_schema import Keys
 from automax_ros.rackfile.model.module import Interrupt, Registers
 from automax_ros.rackfile.model.task import TaskConfig
-from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 
 
 class WithoutTasks:
@@ -108,11 +108,11 @@ class IoKind:
         titles = {number: model.title for number, model in self.table.items()}
         object.__setattr__(self, "models", MappingProxyType(titles))
 
-    def read(self, found: FoundModule) -> IoConfig:
+    def read(self, found: ModuleSection) -> IoConfig:
         """Read the section, which has no keys of its own."""
         return IoConfig(found.slot, found.model, self.node, self.table[found.model].registers, found.span.line)
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Find nothing wrong: no source tells of a slot where these modules may not stand."""
 
 

@@ -9,13 +9,13 @@ from typing import Protocol
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.json_schema import Keys
 from automax_ros.rackfile.model.module import ModuleConfig
-from automax_ros.rackfile.reading.values import Findings, Section
+from automax_ros.rackfile.reading.values import ProblemList, Section
 from automax_ros.rackfile.sections.plants import Plants
 from automax_ros.rackfile.sections.tasks import TaskReader
 
 
 @dataclass(frozen=True)
-class FoundModule:
+class ModuleSection:
     """A module of a rack file as its kind reads it; ``where`` names it in messages.
 
     ``executive`` is the version of the Programming Executive in tenths (``rackfile/reading/executive.py``).
@@ -27,13 +27,13 @@ class FoundModule:
     where: str
     span: Span
     tasks: TaskReader
-    findings: Findings
+    findings: ProblemList
     executive: int
     plants: Plants
 
 
 @dataclass(frozen=True)
-class Standing:
+class PlacedModule:
     """A module as the rules of places see it: all modules whose number is known, right in the rest or not."""
 
     slot: int
@@ -43,19 +43,19 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class Arrangement:
+class RackLayout:
     """All modules of a rack file. Unless ``complete``, one could not be read and may be the one that a rule misses.
 
     ``modules`` are the configurations of those that could be read, in the order of slots.
     """
 
-    standing: Sequence[Standing]
+    standing: Sequence[PlacedModule]
     complete: bool
     span: Span
-    findings: Findings
+    findings: ProblemList
     modules: Sequence[ModuleConfig] = ()
 
-    def of(self, kind: ModuleKind) -> list[Standing]:
+    def of(self, kind: ModuleKind) -> list[PlacedModule]:
         """Return the modules of one kind, in the order of slots."""
         return sorted((item for item in self.standing if item.kind is kind), key=lambda item: item.slot)
 
@@ -77,10 +77,10 @@ class ModuleKind(Protocol):
         """The keys of its section with the schemas of their values, ``module`` left out."""
         ...
 
-    def read(self, found: FoundModule) -> ModuleConfig | None:
+    def read(self, found: ModuleSection) -> ModuleConfig | None:
         """Read a module's section; what is wrong goes to the findings, None where no module can be made of it."""
         ...
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Report modules of this kind that stand where none can, or that are missing."""
         ...

@@ -30,9 +30,9 @@ from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Node
 from automax_ros.rackfile.model.module import Registers
 from automax_ros.rackfile.modules.io import WithoutTasks
-from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 from automax_ros.rackfile.reading.names import RACK_NAME, is_rack_name
-from automax_ros.rackfile.reading.values import Findings, integer_value, text_value
+from automax_ros.rackfile.reading.values import ProblemList, integer_value, text_value
 
 AREA = 64
 """Registers of the area of one drop."""
@@ -140,7 +140,7 @@ class NetworkKind:
         }
     )
 
-    def read(self, found: FoundModule) -> NetworkConfig | None:
+    def read(self, found: ModuleSection) -> NetworkConfig | None:
         """Read network, drop and depth."""
         section, findings = found.section, found.findings
         if not section.require(("network", "drop"), found.where, found.span, findings):
@@ -159,7 +159,7 @@ class NetworkKind:
             else NetworkConfig(found.slot, found.model, name, number, depth, found.span.line, drop.span)
         )
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Report two modules of the rack that represent one drop of a network (57C570 manual p. 18-7)."""
         own = [module for module in rack.modules if isinstance(module, NetworkConfig)]
         for index, module in enumerate(own):
@@ -174,7 +174,7 @@ class NetworkKind:
 NETWORK = NetworkKind()
 
 
-def _network_name(node: Node, what: str, findings: Findings) -> str | None:
+def _network_name(node: Node, what: str, findings: ProblemList) -> str | None:
     text = text_value(node, what, findings, limit=100)
     if text is None:
         return None
@@ -186,7 +186,7 @@ def _network_name(node: Node, what: str, findings: Findings) -> str | None:
     return name
 
 
-def _depth(node: Node | None, drop: int, found: FoundModule) -> int | None:
+def _depth(node: Node | None, drop: int, found: ModuleSection) -> int | None:
     if node is None:
         return 1
     if drop == MASTER:

@@ -21,7 +21,7 @@ from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rackfile.model.module import NO_REGISTERS, Registers
 from automax_ros.rackfile.model.task import TaskConfig
 from automax_ros.rackfile.modules.common_memory import COMMON_MEMORY
-from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 from automax_ros.rackfile.reading.executive import OLDEST, tick_fault, version_text
 from automax_ros.rackfile.reading.values import wrong_kind
 from automax_ros.rackfile.sections.tasks import PRIORITIES, tasks_schema
@@ -76,7 +76,7 @@ class ProcessorKind:
         }
     )
 
-    def read(self, found: FoundModule) -> ProcessorConfig:
+    def read(self, found: ModuleSection) -> ProcessorConfig:
         """Read tick and tasks."""
         _check_model(found)
         tick = _tick(found.section.get("tick_ms"), found)
@@ -84,7 +84,7 @@ class ProcessorKind:
         read = found.tasks.read(tasks, found.where) if tasks else ()
         return ProcessorConfig(found.slot, found.model, tick, read, found.span.line)
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Report too few or too many Processors, and those in other slots than 1 to 4, or 0 for a Processor alone."""
         own = rack.of(self)
         if not rack.complete:
@@ -112,7 +112,7 @@ class ProcessorKind:
 PROCESSOR = ProcessorKind()
 
 
-def _tick(node: Node | None, found: FoundModule) -> int:
+def _tick(node: Node | None, found: ModuleSection) -> int:
     if node is None:
         return DEFAULT_TICK_NS
     if not isinstance(node, Scalar) or not node.plain or not _TICK.match(node.text):
@@ -129,7 +129,7 @@ def _tick(node: Node | None, found: FoundModule) -> int:
     return tick
 
 
-def _check_model(found: FoundModule) -> None:
+def _check_model(found: ModuleSection) -> None:
     since = _SINCE.get(found.model, OLDEST)
     if found.executive < since:
         message = f"{found.where} needs executive {version_text(since)} or later, not {version_text(found.executive)}"
@@ -160,12 +160,12 @@ class Pc3000Kind(ProcessorKind):
     word = "PC3000"
     models = dict.fromkeys(("57C560", "57C570"), "PC3000")
 
-    def read(self, found: FoundModule) -> Pc3000Config:
+    def read(self, found: ModuleSection) -> Pc3000Config:
         """Read tick and tasks."""
         plain = super().read(found)
         return Pc3000Config(plain.slot, plain.model, plain.tick_ns, plain.tasks, plain.line)
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Report a PC3000 in another slot than 0, and whatever stands next to one."""
         own = rack.of(self)
         for item in own[:1]:

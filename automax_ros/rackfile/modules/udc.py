@@ -30,8 +30,8 @@ from automax_ros.language.tree.walk import arguments_of, expressions_of, parts, 
 from automax_ros.rackfile.model.module import Interrupt, Registers
 from automax_ros.rackfile.model.plants import PlantConfig, plant_name
 from automax_ros.rackfile.model.task import TaskConfig
-from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
-from automax_ros.rackfile.reading.values import Findings, Section, entries_of, text_value
+from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, text_value
 from automax_ros.rackfile.sections.tasks import TaskPlace, tasks_schema
 
 COUNT = 2048
@@ -153,7 +153,7 @@ class _Drives:
     def __init__(self) -> None:
         self._taken: dict[str, Span] = {}
 
-    def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
+    def read(self, node: Node, what: str, findings: ProblemList) -> TaskPlace | None:
         """Return a drive."""
         text = text_value(node, f"drive of {what}", findings, limit=100)
         if text is None:
@@ -181,7 +181,7 @@ class UdcKind:
     models = {"57552": "UDC module"}  # noqa: RUF012
     options: Keys = MappingProxyType({"tasks": tasks_schema(_Drives()), "plants": _PLANTS})
 
-    def read(self, found: FoundModule) -> UdcConfig:
+    def read(self, found: ModuleSection) -> UdcConfig:
         """Read tasks and plants."""
         node = found.section.get("tasks")
         tasks = found.tasks.read(node, found.where, _Drives()) if node else ()
@@ -190,7 +190,7 @@ class UdcKind:
         in_order = tuple(sorted(tasks, key=lambda task: task.priority))
         return UdcConfig(found.slot, found.model, in_order, _plants(found), found.span.line)
 
-    def check_places(self, rack: Arrangement) -> None:
+    def check_places(self, rack: RackLayout) -> None:
         """Report too many UDCs; no source tells of a slot where one may not stand."""
         own = rack.of(self)
         if len(own) > MAX_UDCS:
@@ -201,7 +201,7 @@ class UdcKind:
 UDC = UdcKind()
 
 
-def _check_source_kind(task: TaskConfig, found: FoundModule) -> None:
+def _check_source_kind(task: TaskConfig, found: ModuleSection) -> None:
     """Report a task in a language that a UDC does not have (J2-3106-1 p. 2-5)."""
     suffix = task.file.suffix.upper()
     if suffix != ".BLK":
@@ -209,7 +209,7 @@ def _check_source_kind(task: TaskConfig, found: FoundModule) -> None:
         found.findings.add("AMX6304", message, Span(task.line, 1, 2))
 
 
-def _plants(found: FoundModule) -> Mapping[str, PlantConfig]:
+def _plants(found: ModuleSection) -> Mapping[str, PlantConfig]:
     node = found.section.get("plants")
     if node is None:
         return {}

@@ -23,7 +23,7 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.compile.base.cost import Model
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_MS, UDC_TICK_NS
 from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataType, declaration_text
@@ -126,7 +126,7 @@ _UNKNOWN_NS = 1 << 62
 """Stands for the scan period of a task with errors."""
 
 
-class DraftFault(Fault):
+class DraftFault(UserError):
     """No rack file can be made of a folder."""
 
 

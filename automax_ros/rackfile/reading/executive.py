@@ -9,7 +9,7 @@ import re
 
 from automax_ros.core.ticks import DEFAULT_TICK_NS
 from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.rackfile.reading.values import Findings, wrong_kind
+from automax_ros.rackfile.reading.values import ProblemList, wrong_kind
 
 OLDEST, NEWEST = 20, 42
 """The versions that the manuals at hand describe: 2.0 (1.1) to 4.2 (J2-3045)."""
@@ -21,7 +21,7 @@ _TICK_CHOSEN = 31
 _MORE_FORCES = 40
 
 
-def executive_value(node: Node, findings: Findings) -> int:
+def executive_value(node: Node, findings: ProblemList) -> int:
     """Return a version such as 3.8 in tenths; what is wrong is reported, and gives the newest."""
     match = _VERSION.match(node.text) if isinstance(node, Scalar) and node.plain else None
     if match is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.types import (
     DEFAULT_STRING_LENGTH,
     MAX_ARRAY_ELEMENTS,
@@ -37,7 +37,7 @@ _DECLARATION = re.compile(
 _SIZE = re.compile(r"[0-9]{1,9}\Z")
 
 
-class DeclarationFault(Fault):
+class DeclarationFault(UserError):
     """A name breaks a rule; ``code`` is the problem's."""
 
     def __init__(self, code: str, message: str, hint: str | None = None) -> None:

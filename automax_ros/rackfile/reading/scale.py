@@ -16,7 +16,14 @@ from automax_ros.core.numbers import REAL_LIMIT, round_count
 from automax_ros.core.types import DataType
 from automax_ros.core.yaml_text import Node, Sequence
 from automax_ros.rackfile.reading.names import VariableName
-from automax_ros.rackfile.reading.values import Findings, Section, entries_of, integer_value, number_value, wrong_kind
+from automax_ros.rackfile.reading.values import (
+    ProblemList,
+    Section,
+    entries_of,
+    integer_value,
+    number_value,
+    wrong_kind,
+)
 
 _CODE = "AMX6450"
 _KEYS: Keys = {
@@ -50,7 +57,7 @@ class Scale:
         return first + round_count(share * (last - first)), False
 
 
-def scale_of(node: Node, declared: VariableName, span: Span, findings: Findings) -> Scale | None:
+def scale_of(node: Node, declared: VariableName, span: Span, findings: ProblemList) -> Scale | None:
     """Read ``{counts: [a, b], value: [x, y]}``; None where there was something to report."""
     what = f"scale of {declared.name}"
     entries = entries_of(node, what, findings)
@@ -69,14 +76,14 @@ def scale_of(node: Node, declared: VariableName, span: Span, findings: Findings)
     return Scale(counts, value) if counts is not None and value is not None else None
 
 
-def _counts(section: Section, what: str, kind: DataType, findings: Findings) -> tuple[int, int] | None:
+def _counts(section: Section, what: str, kind: DataType, findings: ProblemList) -> tuple[int, int] | None:
     low, high = (int(limit) for limit in kind.range)
     items = _pair(section, "counts", what, findings)
     numbers = [integer_value(item, f"counts of the {what}", findings, low=low, high=high, code=_CODE) for item in items]
     return _different(section, "counts", what, numbers, findings)
 
 
-def _values(section: Section, what: str, findings: Findings) -> tuple[float, float] | None:
+def _values(section: Section, what: str, findings: ProblemList) -> tuple[float, float] | None:
     items = _pair(section, "value", what, findings)
     limit = {"low": -REAL_LIMIT, "high": REAL_LIMIT}
     numbers = [number_value(item, f"value of the {what}", findings, **limit, code=_CODE) for item in items]
@@ -87,7 +94,7 @@ def _values(section: Section, what: str, findings: Findings) -> tuple[float, flo
     return found
 
 
-def _pair(section: Section, key: str, what: str, findings: Findings) -> tuple[Node, ...]:
+def _pair(section: Section, key: str, what: str, findings: ProblemList) -> tuple[Node, ...]:
     """Return the two items of a list, () (reported) where there is something else."""
     node = section.get(key)
     assert node is not None
@@ -98,7 +105,7 @@ def _pair(section: Section, key: str, what: str, findings: Findings) -> tuple[No
 
 
 def _different(
-    section: Section, key: str, what: str, numbers: list[_N | None], findings: Findings
+    section: Section, key: str, what: str, numbers: list[_N | None], findings: ProblemList
 ) -> tuple[_N, _N] | None:
     given = [number for number in numbers if number is not None]
     if len(given) != 2:
@@ -109,6 +116,6 @@ def _different(
     return given[0], given[1]
 
 
-def _report_equal(section: Section, key: str, what: str, findings: Findings) -> None:
+def _report_equal(section: Section, key: str, what: str, findings: ProblemList) -> None:
     message = f"the two numbers of {key} of the {what} are equal"
     findings.add(_CODE, message, section.key_span(key), "write those of two different points")

@@ -24,7 +24,7 @@ MAX_FINDINGS = 200
 _YAML_CODES = {Flaw.SYNTAX: "AMX6003", Flaw.EXTRA: "AMX6004", Flaw.SIZE: "AMX6005"}
 
 
-class Findings:
+class ProblemList:
     """The diagnostics of one file so far."""
 
     def __init__(self) -> None:
@@ -86,12 +86,12 @@ def kind_of(node: Node) -> str:
     return quoted(node.text) if node.plain else f"the text {quoted(node.text)}"
 
 
-def wrong_kind(node: Node, what: str, wanted: str, findings: Findings, hint: str | None = None) -> None:
+def wrong_kind(node: Node, what: str, wanted: str, findings: ProblemList, hint: str | None = None) -> None:
     """Report that ``what`` is not of the kind it must be."""
     findings.add("AMX6008", f"{what} must be {wanted}, not {kind_of(node)}", node.span, hint)
 
 
-def text_value(node: Node, what: str, findings: Findings, *, limit: int) -> str | None:
+def text_value(node: Node, what: str, findings: ProblemList, *, limit: int) -> str | None:
     """Return a text of one line with at most ``limit`` characters; quotes are optional."""
     if not isinstance(node, Scalar) or node.is_null:
         wrong_kind(node, what, "text", findings)
@@ -111,7 +111,7 @@ def is_clean(text: str) -> bool:
     return all(char.isprintable() or char == "\t" for char in text)
 
 
-def boolean_value(node: Node, what: str, findings: Findings) -> bool | None:
+def boolean_value(node: Node, what: str, findings: ProblemList) -> bool | None:
     """Return true or false."""
     value = value_of(node.text, DataType.BOOLEAN) if is_plain_word(node) else None
     if not isinstance(value, bool):
@@ -120,12 +120,12 @@ def boolean_value(node: Node, what: str, findings: Findings) -> bool | None:
     return value
 
 
-def integer_value(node: Node, what: str, findings: Findings, *, low: int, high: int, code: str) -> int | None:
+def integer_value(node: Node, what: str, findings: ProblemList, *, low: int, high: int, code: str) -> int | None:
     """Return a whole number from ``low`` to ``high``; ``code`` is the problem where it is not in this range."""
     return _number(node, what, "a whole number", whole_number, findings, (low, high, code))
 
 
-def number_value(node: Node, what: str, findings: Findings, *, low: float, high: float, code: str) -> float | None:
+def number_value(node: Node, what: str, findings: ProblemList, *, low: float, high: float, code: str) -> float | None:
     """Return a number from ``low`` to ``high``; ``code`` is the problem where it is not in this range."""
     return _number(node, what, "a number", number, findings, (low, high, code))
 
@@ -140,7 +140,7 @@ def _number(
     what: str,
     word: str,
     read: Callable[[str], _T],
-    findings: Findings,
+    findings: ProblemList,
     limits: tuple[float, float, str],
 ) -> _T | None:
     low, high, code = limits
@@ -173,7 +173,7 @@ def number_hint(node: Node) -> str | None:
 Entry = tuple[Scalar, Node]
 
 
-def entries_of(node: Node, what: str, findings: Findings) -> tuple[Entry, ...] | None:
+def entries_of(node: Node, what: str, findings: ProblemList) -> tuple[Entry, ...] | None:
     """Return keys and values, () for a key without a value; None (reported) where something else stands."""
     if isinstance(node, Mapping):
         return node.entries
@@ -194,7 +194,7 @@ class Section:
         entries: Iterable[Entry],
         what: str,
         known: Collection[str],
-        findings: Findings,
+        findings: ProblemList,
         hints: AbstractMapping[str, str] | None = None,
     ) -> None:
         """Sort the entries; ``what`` names the section in messages, ``known`` are its keys.
@@ -224,7 +224,7 @@ class Section:
         """Return the place of a key that the section has."""
         return self._values[key][0].span
 
-    def require(self, keys: Iterable[str], what: str, span: Span, findings: Findings) -> bool:
+    def require(self, keys: Iterable[str], what: str, span: Span, findings: ProblemList) -> bool:
         """Report AMX6009 if keys are missing; return whether all are there."""
         missing = [key for key in keys if key not in self._values]
         if missing:
@@ -234,7 +234,7 @@ class Section:
         return not missing
 
 
-def report_twice(key: Scalar, what: str, first: Span, findings: Findings, code: str = "AMX6006") -> None:
+def report_twice(key: Scalar, what: str, first: Span, findings: ProblemList, code: str = "AMX6006") -> None:
     """Report that something is defined a second time."""
     notes = (Note("first defined here", first),)
     findings.add(code, f"{what} is already defined in line {first.line}", key.span, notes=notes)

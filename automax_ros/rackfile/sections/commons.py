@@ -36,7 +36,7 @@ from automax_ros.rackfile.reading.names import COMMON_NAME, DeclarationFault, Va
 from automax_ros.rackfile.reading.scale import SCHEMA as SCALE
 from automax_ros.rackfile.reading.scale import Scale, scale_of
 from automax_ros.rackfile.reading.values import (
-    Findings,
+    ProblemList,
     Section,
     boolean_value,
     entries_of,
@@ -54,7 +54,7 @@ _CODE = "AMX6406"
 
 
 def preset_value(
-    node: Node, variable: VariableName, elements: int, findings: Findings
+    node: Node, variable: VariableName, elements: int, findings: ProblemList
 ) -> Value | tuple[Value, ...] | None:
     """Return the preset of a variable with ``elements`` values; None where there was something to report."""
     what = f"preset of {variable.name}"
@@ -71,7 +71,7 @@ def preset_value(
     return tuple(value for value in values if value is not None) if None not in values else None
 
 
-def _one(node: Node, variable: VariableName, what: str, findings: Findings) -> Value | None:
+def _one(node: Node, variable: VariableName, what: str, findings: ProblemList) -> Value | None:
     kind = variable.type
     if kind is DataType.STRING:
         return _text(node, variable.length, what, findings)
@@ -81,7 +81,7 @@ def _one(node: Node, variable: VariableName, what: str, findings: Findings) -> V
     return value
 
 
-def _text(node: Node, length: int, what: str, findings: Findings) -> str | None:
+def _text(node: Node, length: int, what: str, findings: ProblemList) -> str | None:
     text = text_value(node, what, findings, limit=1000)
     if text is not None and len(text) > length:
         findings.add(_CODE, f"{what} has {len(text)} characters; the string holds {length}", node.span)
@@ -125,7 +125,7 @@ class CommonReader:
     """Reads the ``common`` section."""
 
     def __init__(
-        self, modules: Iterable[ModuleConfig], findings: Findings, unread: frozenset[int] = frozenset()
+        self, modules: Iterable[ModuleConfig], findings: ProblemList, unread: frozenset[int] = frozenset()
     ) -> None:
         """Begin with no variables; I/O points stand on ``modules``, or in slots whose module could not be read."""
         self._points = PointReader(modules, findings, unread)

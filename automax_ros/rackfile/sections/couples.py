@@ -12,7 +12,7 @@ from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.coupling import LEAST_RATIO, MOST_RATIO, CouplingData
 from automax_ros.rackfile.model.plant_data import build_plants, couple_plants
 from automax_ros.rackfile.model.plants import CoupleConfig, PlantConfig, plant_name
-from automax_ros.rackfile.reading.values import Findings, Section, entries_of, number_value, text_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value, text_value
 
 CODE = "AMX6478"
 RANGES = {
@@ -30,7 +30,7 @@ KEYS: Keys = {
 SCHEMA: Schema = section("What couples the shaft to that of another plant.", KEYS, ("to",))
 
 
-def read_couple(node: Node, what: str, findings: Findings) -> CoupleConfig | None:
+def read_couple(node: Node, what: str, findings: ProblemList) -> CoupleConfig | None:
     """Return what a plant is coupled to, None where there was something to report."""
     where = f"couple of {what}"
     entries = entries_of(node, where, findings)
@@ -55,7 +55,7 @@ def read_couple(node: Node, what: str, findings: Findings) -> CoupleConfig | Non
     return CoupleConfig(findings.upper_case(text, named.span), CouplingData(**numbers), named.span.line)
 
 
-def check_couples(plants: Mapping[str, PlantConfig], findings: Findings) -> None:
+def check_couples(plants: Mapping[str, PlantConfig], findings: ProblemList) -> None:
     """Report couplings to nothing, or of a plant that is coupled already; then those that cannot be simulated."""
     taken: dict[str, int] = {}
     before = findings.errors
@@ -67,7 +67,7 @@ def check_couples(plants: Mapping[str, PlantConfig], findings: Findings) -> None
 
 
 def _check(
-    name: str, couple: CoupleConfig, plants: Mapping[str, PlantConfig], taken: dict[str, int], findings: Findings
+    name: str, couple: CoupleConfig, plants: Mapping[str, PlantConfig], taken: dict[str, int], findings: ProblemList
 ) -> None:
     span = Span(couple.line, 1, 2)
     other = plants.get(couple.to)
@@ -87,7 +87,7 @@ def _check(
     taken.update(dict.fromkeys((name, couple.to), couple.line))
 
 
-def _try(plants: Mapping[str, PlantConfig], findings: Findings) -> None:
+def _try(plants: Mapping[str, PlantConfig], findings: ProblemList) -> None:
     """Report what only shows when the plants are made."""
     made = build_plants(plants.values())
     for config in plants.values():

@@ -17,7 +17,7 @@ from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.plants import FeedConfig
 from automax_ros.rackfile.reading.names import VariableName
 from automax_ros.rackfile.reading.scale import Scale, scale_of
-from automax_ros.rackfile.reading.values import Findings, Section, entries_of, number_value, report_twice, text_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value, report_twice, text_value
 from automax_ros.rackfile.sections.plant_keys import FEED_KEYS, LEAST_MS, MOST_MS, USUAL_MS
 
 CODE = "AMX6479"
@@ -28,7 +28,7 @@ def read_feeds(
     given: Sequence[tuple[str, Node]],
     variables: Sequence[CommonVariable],
     modules: Sequence[ModuleConfig],
-    findings: Findings,
+    findings: ProblemList,
 ) -> tuple[FeedConfig, ...]:
     """Return the feeds of all plants; what is wrong goes to the findings. Commons with errors are not looked for."""
     reader = _FeedReader(variables, modules, findings)
@@ -42,7 +42,7 @@ def read_feeds(
 
 class _FeedReader:
     def __init__(
-        self, variables: Sequence[CommonVariable], modules: Sequence[ModuleConfig], findings: Findings
+        self, variables: Sequence[CommonVariable], modules: Sequence[ModuleConfig], findings: ProblemList
     ) -> None:
         self._variables = {variable.name: variable for variable in variables}
         self._registers = {module.slot: module.registers for module in modules}

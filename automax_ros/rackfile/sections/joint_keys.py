@@ -17,7 +17,7 @@ from automax_ros.core.json_schema import Keys, Schema, may_be_empty, named, sect
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Node
 from automax_ros.rackfile.reading.scale import SCHEMA as SCALE
-from automax_ros.rackfile.reading.values import Findings, Section, entries_of, text_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, text_value
 
 CODE = "AMX6310"
 JOINT_NAME = r"[A-Za-z](?:_?[A-Za-z0-9])*"
@@ -54,7 +54,7 @@ class GivenJoint:
     commands: tuple[tuple[str, Node], ...]
 
 
-def read_joint(node: Node, plant: str, findings: Findings) -> GivenJoint:
+def read_joint(node: Node, plant: str, findings: ProblemList) -> GivenJoint:
     """Return the joint of a plant, named as the plant unless the file says more; what is wrong goes to findings."""
     where = f"joint of plant {plant}"
     section = Section(entries_of(node, where, findings) or (), where, KEYS, findings)
@@ -65,7 +65,7 @@ def read_joint(node: Node, plant: str, findings: Findings) -> GivenJoint:
     return GivenJoint(plant, name or plant, given)
 
 
-def check_joint_names(names: Mapping[str, tuple[str, Span]], findings: Findings) -> None:
+def check_joint_names(names: Mapping[str, tuple[str, Span]], findings: ProblemList) -> None:
     """Report joints of one name; ``names`` are those of the plants, with the place of each plant."""
     seen: dict[str, str] = {}
     for plant, (name, span) in names.items():
@@ -75,7 +75,7 @@ def check_joint_names(names: Mapping[str, tuple[str, Span]], findings: Findings)
         seen.setdefault(name, plant)
 
 
-def _name(node: Node, where: str, findings: Findings) -> str | None:
+def _name(node: Node, where: str, findings: ProblemList) -> str | None:
     text = text_value(node, f"name of the {where}", findings, limit=100)
     if text is None:
         return None

@@ -14,14 +14,14 @@ from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.rackfile.model.plants import JointCommand
 from automax_ros.rackfile.reading.names import VariableName
 from automax_ros.rackfile.reading.scale import Scale, scale_of
-from automax_ros.rackfile.reading.values import Findings, Section, entries_of, text_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, text_value
 from automax_ros.rackfile.sections.joint_keys import CODE, COMMAND_KEYS, GivenJoint
 
 _ABSENT = "the rack has no common variable"
 
 
 def read_commands(
-    given: Iterable[GivenJoint], variables: Sequence[CommonVariable], findings: Findings
+    given: Iterable[GivenJoint], variables: Sequence[CommonVariable], findings: ProblemList
 ) -> tuple[JointCommand, ...]:
     """Return the commands of all joints; what is wrong goes to findings. Commons with errors are not looked for."""
     reader = _CommandReader(variables, findings)
@@ -30,7 +30,7 @@ def read_commands(
 
 
 class _CommandReader:
-    def __init__(self, variables: Sequence[CommonVariable], findings: Findings) -> None:
+    def __init__(self, variables: Sequence[CommonVariable], findings: ProblemList) -> None:
         self._variables = {variable.name: variable for variable in variables}
         self._findings = findings
         self._is_whole = not findings.errors

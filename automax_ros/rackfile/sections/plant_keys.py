@@ -12,7 +12,7 @@ from automax_ros.drive.circuit.ac_line import HIGHEST_HZ, LOWEST_HZ
 from automax_ros.drive.plant.signals import SIGNALS
 from automax_ros.rackfile.model.plants import LoadConfig, SupplyConfig
 from automax_ros.rackfile.reading.scale import SCHEMA as SCALE
-from automax_ros.rackfile.reading.values import Findings, Section, entries_of, number_value, text_value, wrong_kind
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value, text_value, wrong_kind
 
 CODE = "AMX6477"
 SUPPLY = {"v_ll": (50.0, 1000.0), "hz": (LOWEST_HZ, HIGHEST_HZ), "ls_mh": (0.001, 10.0), "rs_mohm": (0.0, 1000.0)}
@@ -55,7 +55,7 @@ INERTIA_SCHEMA: Schema = number("Inertia of motor and load over the motor's own.
 _ALONE = "speed_rpm"
 
 
-def read_supply(node: Node, what: str, findings: Findings) -> SupplyConfig:
+def read_supply(node: Node, what: str, findings: ProblemList) -> SupplyConfig:
     """Return a plant's AC line; what is wrong goes to the findings."""
     where = f"line of {what}"
     section = Section(entries_of(node, where, findings) or (), where, _SUPPLY_KEYS, findings)
@@ -65,7 +65,7 @@ def read_supply(node: Node, what: str, findings: Findings) -> SupplyConfig:
     )
 
 
-def read_load(node: Node, what: str, findings: Findings) -> LoadConfig:
+def read_load(node: Node, what: str, findings: ProblemList) -> LoadConfig:
     """Return a plant's load; what is wrong goes to the findings."""
     where = f"load of {what}"
     section = Section(entries_of(node, where, findings) or (), where, _LOAD_KEYS, findings, LOAD_HINTS)
@@ -80,7 +80,7 @@ def read_load(node: Node, what: str, findings: Findings) -> LoadConfig:
     )
 
 
-def read_inertia(node: Node, what: str, findings: Findings) -> float:
+def read_inertia(node: Node, what: str, findings: ProblemList) -> float:
     """Return a plant's inertia over its motor's own, 1 where there was something to report."""
     where = f"inertia of {what}"
     found = number_value(node, where, findings, low=LEAST_INERTIA, high=MOST_INERTIA, code=CODE)
@@ -88,7 +88,7 @@ def read_inertia(node: Node, what: str, findings: Findings) -> float:
 
 
 def _numbers(
-    section: Section, ranges: dict[str, tuple[float, float]], where: str, findings: Findings
+    section: Section, ranges: dict[str, tuple[float, float]], where: str, findings: ProblemList
 ) -> dict[str, float]:
     numbers: dict[str, float] = {}
     for key, (low, high) in ranges.items():
@@ -99,7 +99,7 @@ def _numbers(
     return numbers
 
 
-def _standard(node: Node | None, where: str, findings: Findings) -> bool:
+def _standard(node: Node | None, where: str, findings: ProblemList) -> bool:
     text = text_value(node, f"rotation of {where}", findings, limit=100) if node is not None else None
     if node is not None and text is not None and text not in (STANDARD, OTHER):
         message = f"rotation of {where} is {quoted(text)}; it must be {STANDARD} (the standard one) or {OTHER}"
@@ -107,7 +107,7 @@ def _standard(node: Node | None, where: str, findings: Findings) -> bool:
     return text != OTHER
 
 
-def _check_alone(section: Section, where: str, findings: Findings) -> None:
+def _check_alone(section: Section, where: str, findings: ProblemList) -> None:
     """Report a held shaft with other loads: none of them would matter."""
     others = [key for key in ("torque_nm", "torque_per_rpm", "friction_nm", "ros") if key in section]
     if _ALONE in section and others:
@@ -115,7 +115,7 @@ def _check_alone(section: Section, where: str, findings: Findings) -> None:
         findings.add(CODE, message, section.key_span(others[0]), f"leave out {others[0]} or {_ALONE}")
 
 
-def _from_ros(node: Node | None, where: str, findings: Findings) -> bool:
+def _from_ros(node: Node | None, where: str, findings: ProblemList) -> bool:
     text = text_value(node, f"ros of {where}", findings, limit=100) if node is not None else None
     if node is not None and text is not None and text != "in":
         message = f"ros of {where} is {quoted(text)}; it can only be in: ROS 2 sets torque_nm"
@@ -123,7 +123,7 @@ def _from_ros(node: Node | None, where: str, findings: Findings) -> bool:
     return text == "in"
 
 
-def _table(node: Node | None, where: str, findings: Findings) -> tuple[tuple[float, float], ...]:
+def _table(node: Node | None, where: str, findings: ProblemList) -> tuple[tuple[float, float], ...]:
     if node is None:
         return ()
     what = f"torque_per_rpm of {where}"
@@ -139,7 +139,7 @@ def _table(node: Node | None, where: str, findings: Findings) -> tuple[tuple[flo
     return table
 
 
-def _pair(node: Node, what: str, findings: Findings) -> tuple[float, float] | None:
+def _pair(node: Node, what: str, findings: ProblemList) -> tuple[float, float] | None:
     if not isinstance(node, Sequence) or len(node.items) != 2:
         wrong_kind(node, f"a pair of {what}", "a list of two numbers: rpm and N m", findings)
         return None

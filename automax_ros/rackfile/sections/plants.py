@@ -17,7 +17,7 @@ from automax_ros.drive.base.nameplate import NamePlate
 from automax_ros.rackfile.model.plant_data import plant_data
 from automax_ros.rackfile.model.plants import MOTORS, PLANT_NAME, LoadConfig, PlantConfig, SupplyConfig, plant_name
 from automax_ros.rackfile.reading.values import (
-    Findings,
+    ProblemList,
     Section,
     entries_of,
     integer_value,
@@ -89,7 +89,7 @@ _LIMIT = 100
 class Plants:
     """The plants of one rack file, and who has claimed them; ``feeds`` and ``joints`` are read on with the commons."""
 
-    findings: Findings
+    findings: ProblemList
     known: dict[str, PlantConfig] = field(default_factory=dict)
     complete: bool = True
     feeds: list[tuple[str, Node]] = field(default_factory=list)
@@ -117,7 +117,7 @@ class Plants:
         return plant
 
 
-def read_plants(node: Node | None, findings: Findings) -> Plants:
+def read_plants(node: Node | None, findings: ProblemList) -> Plants:
     """Return the plants of the section; what is wrong goes to the findings."""
     plants = Plants(findings)
     if node is None:
@@ -174,7 +174,7 @@ def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
     return config
 
 
-def _check_data(config: PlantConfig, span: Span, findings: Findings) -> None:
+def _check_data(config: PlantConfig, span: Span, findings: ProblemList) -> None:
     """Report a motor that contradicts itself or cannot be simulated."""
     try:
         plant_data(config)
@@ -182,12 +182,12 @@ def _check_data(config: PlantConfig, span: Span, findings: Findings) -> None:
         findings.add("AMX6473", f"plant {config.name}: {error}", span)
 
 
-def _ratio(node: Node, what: str, findings: Findings) -> int | None:
+def _ratio(node: Node, what: str, findings: ProblemList) -> int | None:
     low, high = MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO
     return integer_value(node, f"motor_overload_ratio of {what}", findings, low=low, high=high, code="AMX6475")
 
 
-def _motor(node: Node, what: str, findings: Findings) -> str | NamePlate | None:
+def _motor(node: Node, what: str, findings: ProblemList) -> str | NamePlate | None:
     if isinstance(node, Mapping):
         return _plate(node, what, findings)
     name = text_value(node, what, findings, limit=_LIMIT)
@@ -201,7 +201,7 @@ def _motor(node: Node, what: str, findings: Findings) -> str | NamePlate | None:
     return name
 
 
-def _plate(node: Mapping, what: str, findings: Findings) -> NamePlate | None:
+def _plate(node: Mapping, what: str, findings: ProblemList) -> NamePlate | None:
     section = Section(node.entries, what, _PLATE, findings)
     if not section.require(_PLATE_REQUIRED, what, node.span, findings):
         return None

@@ -10,7 +10,7 @@ from automax_ros.core.types import DataType
 from automax_ros.rackfile.model.config import MAX_SLOT, Point
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.reading.names import VariableName
-from automax_ros.rackfile.reading.values import Findings, Section, integer_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, integer_value
 
 KEYS: Keys = {
     "slot": whole("Slot of the module that the point belongs to.", 0, MAX_SLOT),
@@ -27,7 +27,7 @@ class PointReader:
     """Reads the places of I/O points. A word may have a name and its bits too, otherwise a bit has one name."""
 
     def __init__(
-        self, modules: Iterable[ModuleConfig], findings: Findings, unread: frozenset[int] = frozenset()
+        self, modules: Iterable[ModuleConfig], findings: ProblemList, unread: frozenset[int] = frozenset()
     ) -> None:
         """Take the modules of the rack that are right, and the slots of the others: nothing is said of points there."""
         self._unread = unread

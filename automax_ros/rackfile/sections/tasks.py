@@ -15,7 +15,7 @@ from automax_ros.rackfile.model.task import MAX_PRIORITY, MAX_TASKS, MIN_PRIORIT
 from automax_ros.rackfile.reading.files import FileFault, read_bytes, stays_next_to
 from automax_ros.rackfile.reading.names import TASK_NAME, DeclarationFault, check_task_name
 from automax_ros.rackfile.reading.values import (
-    Findings,
+    ProblemList,
     Section,
     boolean_value,
     entries_of,
@@ -56,7 +56,7 @@ class TaskPlaces(Protocol):
         """The schema of what stands after the key."""
         ...
 
-    def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
+    def read(self, node: Node, what: str, findings: ProblemList) -> TaskPlace | None:
         """Return what the key of a task says, None (reported) where it is wrong."""
         ...
 
@@ -67,7 +67,7 @@ class Priorities:
     key, sample, most = "priority", "8", MAX_TASKS
     schema = whole("4 is served first; equal ones in the order of their names.", MIN_PRIORITY, MAX_PRIORITY)
 
-    def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
+    def read(self, node: Node, what: str, findings: ProblemList) -> TaskPlace | None:
         """Return a priority."""
         what = f"priority of {what}"
         found = integer_value(node, what, findings, low=MIN_PRIORITY, high=MAX_PRIORITY, code="AMX6302")
@@ -103,7 +103,7 @@ class TaskReader:
 
     rack_file: Path | None
     allow_outside: bool
-    findings: Findings
+    findings: ProblemList
     seen: dict[str, Span] = field(default_factory=dict)
 
     def read(self, node: Node, where: str, places: TaskPlaces = PRIORITIES) -> tuple[TaskConfig, ...]:

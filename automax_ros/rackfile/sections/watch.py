@@ -10,7 +10,7 @@ from automax_ros.core.names import NameFault, element
 from automax_ros.core.yaml_text import Node
 from automax_ros.core.yaml_text import Sequence as YamlList
 from automax_ros.rackfile.model.config import CommonElement, CommonVariable
-from automax_ros.rackfile.reading.values import Findings, text_value, wrong_kind
+from automax_ros.rackfile.reading.values import ProblemList, text_value, wrong_kind
 
 MOST_WATCHED = 16
 """Most commons that a rack file watches (decision: a line of a terminal holds no more)."""
@@ -23,7 +23,9 @@ SCHEMA: Schema = listed(
 )
 
 
-def read_watch(node: Node, variables: Sequence[CommonVariable], findings: Findings) -> tuple[CommonElement, ...] | None:
+def read_watch(
+    node: Node, variables: Sequence[CommonVariable], findings: ProblemList
+) -> tuple[CommonElement, ...] | None:
     """Return what a rack file watches; what is wrong goes to findings.
 
     Commons are not looked for while anything else of the file is wrong: theirs may be what is.

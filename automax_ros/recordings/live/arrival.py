@@ -15,7 +15,7 @@ Item = TypeVar("Item")
 _SENT = itemgetter(0)
 
 
-class ArrivalOrder(Generic[Item]):
+class SendOrder(Generic[Item]):
     """Holds messages until ``hold_ns`` have passed here since one that was sent later was taken.
 
     Times of sending are compared with each other alone, times of here likewise: the clocks may differ.

@@ -28,7 +28,7 @@ from automax_ros.messages.cdr.message_headers import (
 from automax_ros.messages.types.messages import VariableTable
 from automax_ros.messages.types.rack_files import RackFile
 from automax_ros.recordings.live.topics import LiveTopics, lacking, provenance
-from automax_ros.recordings.live.tracks import Gap, TaskTrack, has_written, possible, task_head, timely
+from automax_ros.recordings.live.tracks import Gap, TaskProgress, has_written, possible, task_head, timely
 from automax_ros.recordings.mcap.errors import RecordingError
 from automax_ros.recordings.read.common_log import WriteLog
 from automax_ros.recordings.write.data_file import StorageOptions
@@ -83,7 +83,7 @@ class LiveRecording(Recording):
         self._topics, self._table, self._files = topics, table, files
         self._log = WriteLog(self._facts.run_id)
         names = [writer.name for writer in self._facts.writers if writer.kind == WriterKind.TASK]
-        self._tasks = {name: TaskTrack() for name in names if tasks is None or name in tasks}
+        self._tasks = {name: TaskProgress() for name in names if tasks is None or name in tasks}
         self._wrong_sources: list[str] = []
         self._proves = self._recording = False
         self._image: tuple[int, WriteHead, bytes] | None = None

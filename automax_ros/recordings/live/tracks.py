@@ -53,7 +53,7 @@ class Gap:
 
 
 @dataclass
-class TaskTrack:
+class TaskProgress:
     """What is recorded of one task: number and stamp of its last scan, the last scan that a state contains.
 
     ``follows``: each scan since a full one is there. ``ready``: a state joins them, so they can be executed again.

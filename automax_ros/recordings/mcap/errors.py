@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import printable
 
 
-class BagError(Fault):
+class BagError(UserError):
     """A recording cannot be read, understood or exported.
 
     ``code`` is AMX68nn, ``place`` names the file or folder, ``hint`` is "" where there is nothing to do.

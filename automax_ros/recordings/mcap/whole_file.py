@@ -19,7 +19,7 @@ _MOST_PAUSES = 100
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Give the path to write to, in the same folder and with the same suffix; ``path`` is replaced when the block ends.
 
     If the block ends with an exception the new file is removed, and ``path`` stays as it was. A pipe, /dev/stdout

@@ -44,7 +44,7 @@ class PlayTopic:
 
 
 @dataclass
-class Survey:
+class PlayableRecording:
     """A recording read once from end to end, so that nothing is wrong with it.
 
     Times are log times in ns. ``run_start`` is the stamp of the first VariableTable, the time of the first message
@@ -80,7 +80,7 @@ def survey(
     end_ns: int | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
     stopping: Callable[[], bool] = lambda: False,
-) -> Survey:
+) -> PlayableRecording:
     """Read a recording; ``begin_ns`` and ``end_ns`` count from the start of the run, None for all.
 
     ``stopping`` is asked now and then; where it is true the survey ends early and is worth nothing.
@@ -88,7 +88,7 @@ def survey(
     Raises:
         BagError: it is none, is damaged, or is empty in the span.
     """
-    found = Survey(BagReader(path))
+    found = PlayableRecording(BagReader(path))
     found.bag.on_progress = on_progress
     for number, record in enumerate(found.bag.records()):
         if not number & _PROGRESS_MASK and stopping():
@@ -119,7 +119,7 @@ def survey(
     return found
 
 
-def _keep_latched(found: Survey, path: Path, stopping: Callable[[], bool]) -> None:
+def _keep_latched(found: PlayableRecording, path: Path, stopping: Callable[[], bool]) -> None:
     """Keep the last message of each latched topic before the span: late joiners of the run have got it too."""
     size = 0
     for number, record in enumerate(found.bag.records()):
@@ -135,7 +135,7 @@ def _keep_latched(found: Survey, path: Path, stopping: Callable[[], bool]) -> No
         found.latched[topic.name] = record
 
 
-def choose(found: Survey, patterns: Collection[str]) -> list[str]:
+def choose(found: PlayableRecording, patterns: Collection[str]) -> list[str]:
     """Leave only the topics that a pattern names, such as ``/pm1/common/*``; return patterns that name none."""
     unused = [pattern for pattern in patterns if not any(fnmatchcase(name, pattern) for name in found.topics)]
     for name in list(found.topics):
@@ -180,7 +180,7 @@ class Renaming:
         return encode(table._replace(variables=variables))
 
 
-def _topic(found: Survey, path: Path, record: RawMessage) -> PlayTopic:
+def _topic(found: PlayableRecording, path: Path, record: RawMessage) -> PlayTopic:
     name = record.channel.topic
     topic = found.topics.get(name)
     if topic is None:
@@ -210,7 +210,7 @@ def _new_topic(channel: Channel, schema: Schema | None) -> PlayTopic:
     return topic
 
 
-def _take_table(found: Survey, path: Path, record: RawMessage) -> None:
+def _take_table(found: PlayableRecording, path: Path, record: RawMessage) -> None:
     try:
         table = decode(TABLE_TYPE, record.data)
     except CdrError as error:

@@ -23,8 +23,8 @@ from automax_ros.recordings.mcap.opening import NO_BAG_HINT, no_recording
 from automax_ros.recordings.read.reader import MAX_METADATA_BYTES, BagReader, read_information
 from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.repair.contents import FileContents, FileSequence, Provenance, topics_of
-from automax_ros.recordings.repair.rewriting import Definitions, Rewriting
-from automax_ros.recordings.repair.salvage import Salvage
+from automax_ros.recordings.repair.rewriting import Definitions, RepairWriter
+from automax_ros.recordings.repair.salvage import DamagedFileReader
 
 MAX_FILES = 10_000
 _NUMBERED = re.compile(r"(.*?)_?(\d{1,9})\.mcap")
@@ -348,8 +348,8 @@ def _nothing(report: RepairReport) -> BagError:
 
 
 def _rewrite(path: Path, target: Path, file: FileReport, provenance: Provenance) -> None:
-    salvage = Salvage(path)
-    rewriting = Rewriting(target, salvage, Definitions(path), provenance, copy.deepcopy(file.before))
+    salvage = DamagedFileReader(path)
+    rewriting = RepairWriter(target, salvage, Definitions(path), provenance, copy.deepcopy(file.before))
     try:
         rewriting.write()
     finally:

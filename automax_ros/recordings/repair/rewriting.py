@@ -18,7 +18,7 @@ from automax_ros.recordings.mcap.mcap_output import McapOutput
 from automax_ros.recordings.mcap.metadata import BagMetadata, yaml_text
 from automax_ros.recordings.mcap.unpacking import MAX_RECORD_BYTES
 from automax_ros.recordings.repair.contents import SCAN, WRITE, FileContents, FileSequence, Provenance
-from automax_ros.recordings.repair.salvage import Piece, Salvage, SoundChunk, parsed, records
+from automax_ros.recordings.repair.salvage import DamagedFileReader, SoundChunk, SoundPiece, parsed, records
 from automax_ros.recordings.write.data_file import DataFile
 
 _LOOSE_BYTES = 1 << 20
@@ -51,7 +51,7 @@ class Definitions:
         self._bytes = 0
         self._path = path
         compressions = set()
-        for piece in Salvage(path).pieces():
+        for piece in DamagedFileReader(path).pieces():
             if isinstance(piece, (Schema, Channel)):
                 self._take(piece)
             elif isinstance(piece, SoundChunk):
@@ -77,13 +77,13 @@ class Definitions:
             raise BagError("AMX6814", self._path, f"schemas and channels of more than {MAX_RECORD_BYTES} bytes")
 
 
-class Rewriting:
+class RepairWriter:
     """One file being written again. ``write`` does it, ``close`` in any case; then the counts tell how it went."""
 
     def __init__(
         self,
         target: Path,
-        salvage: Salvage,
+        salvage: DamagedFileReader,
         definitions: Definitions,
         provenance: Provenance,
         sequence: FileSequence | None = None,
@@ -131,7 +131,7 @@ class Rewriting:
         """Close the file."""
         self._file.close()
 
-    def _put(self, piece: Piece) -> None:
+    def _put(self, piece: SoundPiece) -> None:
         if isinstance(piece, Attachment):
             self._provenance.take(piece)
             self._output.add_attachment(piece)

@@ -54,12 +54,12 @@ class SoundChunk:
     """Whether more stood in the chunk."""
 
 
-Piece = SoundChunk | Schema | Channel | Attachment | Metadata | bytes
+SoundPiece = SoundChunk | Schema | Channel | Attachment | Metadata | bytes
 """A part of the file that is sound; bytes are the content of a message outside of chunks."""
 
 
 @dataclass
-class Salvage:
+class DamagedFileReader:
     """One file; ``pieces`` reads it once, and the other fields tell then how it went."""
 
     path: Path
@@ -72,7 +72,7 @@ class Salvage:
     """Bytes of the data that could not be used."""
     _resumed: int = 0
 
-    def pieces(self) -> Iterator[Piece]:
+    def pieces(self) -> Iterator[SoundPiece]:
         """Return what is sound, in the order of the file.
 
         Raises:
@@ -83,7 +83,7 @@ class Salvage:
             file.seek(0)
             yield from self._pieces(file, size)
 
-    def _pieces(self, file: BinaryIO, size: int) -> Iterator[Piece]:
+    def _pieces(self, file: BinaryIO, size: int) -> Iterator[SoundPiece]:
         unpacker = Unpacker(self.path, size)
         magic = file.read(len(MAGIC))
         if magic != MAGIC:
@@ -114,7 +114,7 @@ class Salvage:
                 yield found
             position = end
 
-    def _piece(self, opcode: int, content: bytes, unpacker: Unpacker) -> Piece | None:
+    def _piece(self, opcode: int, content: bytes, unpacker: Unpacker) -> SoundPiece | None:
         """Return what a whole record gives; of the summary only schemas and channels, which may be lost elsewhere."""
         if opcode == Opcode.SCHEMA:
             return self._parsed(Schema.read, content)

@@ -17,7 +17,7 @@ from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.values import real_text
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.whole_file import open_at_once, written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write, open_at_once
 from automax_ros.recordings.read.common_log import Cell
 from automax_ros.recordings.tables.series import WHOLE_RUN, Progress, Series, Window
 
@@ -168,7 +168,7 @@ def write_csv(table: Table, output: Path) -> int:
     count = 0
     try:
         with (
-            written_whole(output) as place,
+            atomic_write(output) as place,
             open(place, "w", encoding="utf-8", newline="", opener=open_at_once) as file,
         ):
             writer = csv.writer(file, lineterminator="\n")

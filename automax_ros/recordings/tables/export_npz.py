@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.whole_file import open_at_once, written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write, open_at_once
 from automax_ros.recordings.read.common_log import Cell
 from automax_ros.recordings.tables.export import TIME, Column, Table, unwritable
 
@@ -51,7 +51,7 @@ def write_npz(bag: Path, table: Table, output: Path) -> int:
     arrays["names"] = np.array([TIME, *(item.label for item in table.columns)])
     arrays["units"] = np.array(["s", *(item.unit for item in table.columns)])
     try:
-        with written_whole(output) as place, open(place, "wb", opener=open_at_once) as file:
+        with atomic_write(output) as place, open(place, "wb", opener=open_at_once) as file:
             np.savez_compressed(file, **arrays)  # type: ignore[arg-type]  # none is named allow_pickle
     except OSError as error:
         raise unwritable(output, error) from error

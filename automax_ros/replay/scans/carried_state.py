@@ -37,7 +37,7 @@ class Skipped:
     counted: bool
 
 
-class Beginning:
+class PartStart:
     """What one task asks of the time before its first message: ``unsure`` if an answer may matter.
 
     ``scanned`` and ``went_on``: whether a scan came, and whether the first one was not the start of the task.
@@ -66,7 +66,7 @@ class Beginning:
 
 
 @dataclass(frozen=True)
-class Carried:
+class CarriedState:
     """What a pass carries to a place of a recording: a SHA-256, the stopped tasks, whether no force has ever held."""
 
     content: str

@@ -95,7 +95,7 @@ class _Run:
         return Settled(self._scan, self._time_s, self._low, self._high)
 
 
-class _Tally:
+class _Count:
     """One thing that differs in at least one scan."""
 
     def __init__(self, task: str, kind: Kind, label: Label, first: Point) -> None:
@@ -145,13 +145,13 @@ class _Tally:
             self._run.add(scan, time_s, difference)
 
 
-class Tallies:
+class DifferenceCounts:
     """All that differs in one replay; times count from ``origin`` (ns), at most ``limit`` things are told in full."""
 
     def __init__(self, origin: int, limit: int) -> None:
         self.origin = origin
         self._limit = limit
-        self._by_task: dict[str, dict[tuple[Kind, Hashable], _Tally]] = {}
+        self._by_task: dict[str, dict[tuple[Kind, Hashable], _Count]] = {}
         self._count = 0
         self._beyond: set[tuple[str, Kind, Hashable]] = set()
         self._first: tuple[str, int, float, Seen] | None = None
@@ -233,7 +233,7 @@ class Tallies:
 
     def _new(
         self, task: str, item: Found, scan: int, time_s: float, label: Callable[[Kind, Hashable], Label]
-    ) -> _Tally | None:
+    ) -> _Count | None:
         """Begin a tally; None beyond the limit."""
         if self._count >= self._limit:
             if len(self._beyond) < _MOST_COUNTED:
@@ -241,7 +241,7 @@ class Tallies:
             return None
         self._count += 1
         first = Point(scan, time_s, item.recorded, item.replayed)
-        tally = _Tally(task, item.kind, label(item.kind, item.key), first)
+        tally = _Count(task, item.kind, label(item.kind, item.key), first)
         self._by_task[task][item.kind, item.key] = tally
         return tally
 

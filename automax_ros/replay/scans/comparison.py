@@ -14,7 +14,7 @@ from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.recordings.read.common_log import Entry, Key
 from automax_ros.replay.scans.channels import CHANNELS
 from automax_ros.replay.scans.commons import RecordedCommons
-from automax_ros.replay.scans.compare import Found, Label, Seen, Tallies, within
+from automax_ros.replay.scans.compare import DifferenceCounts, Found, Label, Seen, within
 from automax_ros.replay.scans.inputs import ScanMemory
 from automax_ros.replay.scans.report import Kind, NamedValue, errors_text
 from automax_ros.replay.scans.stored_rack import ReplaySource
@@ -33,7 +33,7 @@ class ScanComparison:
         source: ReplaySource,
         commons: RecordedCommons,
         memory: ScanMemory,
-        tallies: Tallies,
+        tallies: DifferenceCounts,
         tolerance: float,
     ) -> None:
         self.take_up(source)

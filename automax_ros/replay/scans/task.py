@@ -12,9 +12,9 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import seconds_text
 from automax_ros.messages.types.messages import CommonWrite, Operation, Scan, TaskState
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.replay.scans.carried_state import Beginning, Skipped
+from automax_ros.replay.scans.carried_state import PartStart, Skipped
 from automax_ros.replay.scans.commons import RecordedCommons, UnknownValue
-from automax_ros.replay.scans.compare import Found, Tallies
+from automax_ros.replay.scans.compare import DifferenceCounts, Found
 from automax_ros.replay.scans.comparison import ScanComparison
 from automax_ros.replay.scans.inputs import ScanMemory
 from automax_ros.replay.scans.report import Kind
@@ -68,7 +68,7 @@ class TaskReplay:
         bag: Path,
         source: ReplaySource,
         commons: RecordedCommons,
-        tallies: Tallies,
+        tallies: DifferenceCounts,
         *,
         tolerance: float = 0.0,
         starts_at: int | None = None,
@@ -96,7 +96,7 @@ class TaskReplay:
         self._installed_again = False
         self._compared = self._different = self._states = self._left_out = 0
         self._notes: dict[str, None] = {}
-        self.beginning = Beginning()
+        self.beginning = PartStart()
         self._take_up(source)
 
     def totals(self) -> TaskTotals:

@@ -17,10 +17,10 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.cdr.cdr import CdrError, decode, encoder
 from automax_ros.messages.types.messages import Clock
 from automax_ros.messages.types.topics import QosProfile
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
-from automax_ros.ros.intake.rack_lock import Turns
+from automax_ros.ros.intake.rack_lock import RackLock
 from automax_ros.ros.intake.raw_messages import taker_of
 from automax_ros.ros.intake.rcl import library
 from automax_ros.runtime.time.following_pacer import FollowingPacer
@@ -48,9 +48,11 @@ MALFORMED = "malformed /clock"
 class RackClock:
     """Makes the pace of one rack, and joins it with ``/clock``."""
 
-    def __init__(self, scheduler: Scheduler, turns: Turns, *, follows: bool, simulated: SimulatedTime | None) -> None:
+    def __init__(
+        self, scheduler: Scheduler, turns: RackLock, *, follows: bool, simulated: SimulatedTime | None
+    ) -> None:
         """Make the pace; simulated time is the rack's own, even where all nodes are to follow ``/clock``."""
-        self._site: Site | None = None
+        self._site: RackContext | None = None
         self._node: ModuleNode | None = None
         self._topic = CLOCK
         self._publish: Callable[[bytes], object] = _unsent
@@ -59,18 +61,18 @@ class RackClock:
         self._follower: FollowingPacer | None = None
         self.pace: Pace
         if simulated is not None:
-            self.pace = SimulatedPacer(scheduler, self._tell, rate=simulated.rate, turn=turns.scanner)
+            self.pace = SimulatedPacer(scheduler, self._tell, rate=simulated.rate, turn=turns.for_scan)
         elif follows:
-            self.pace = self._follower = FollowingPacer(scheduler, self._jumped, turn=turns.scanner)
+            self.pace = self._follower = FollowingPacer(scheduler, self._jumped, turn=turns.for_scan)
         else:
-            self.pace = Pacer(scheduler, turn=turns.scanner)
+            self.pace = Pacer(scheduler, turn=turns.for_scan)
 
     @property
     def is_there(self) -> bool:
         """Whether the rack can begin: where it follows a clock, that has been heard."""
         return self._follower is None or self._follower.has_clock
 
-    def join(self, site: Site, node: ModuleNode) -> None:
+    def join(self, site: RackContext, node: ModuleNode) -> None:
         """Send or hear ``/clock`` by a node of the rack."""
         self._site, self._node = site, node
         if isinstance(self.pace, SimulatedPacer):
@@ -118,7 +120,7 @@ class RackClock:
         """
         assert self._site is not None
         assert self._follower is not None
-        with self._site.lock.scanner:
+        with self._site.lock.for_scan:
             stamp = self._site.stream.stamp(self._follower.now_ns) + self._follower.ahead_ns(clock_ns)
             if stamp >= _LATEST_NS:
                 raise CdrError(f"{clock_ns} ns comes after a clock that went back, and would be a stamp of {stamp} ns")

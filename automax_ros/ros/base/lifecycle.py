@@ -1,7 +1,8 @@
 """Managed nodes: the states and transitions that ROS 2 lifecycle managers know, over what a rack can do.
 
 A transition is asked of the services that rclpy gives a lifecycle node (``~/change_state`` and others). What it does is
-a ``Duties``; rclpy's own driver is not used, since it swallows what a transition raises and cannot wait for a thread.
+``LifecycleCallbacks``; rclpy's own driver is not used, since it swallows what a transition raises and cannot wait for a
+thread.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from lifecycle_msgs.msg import Transition
 from rclpy.lifecycle import LifecycleNodeMixin, TransitionCallbackReturn
 
 from automax_ros.core.text import printable
-from automax_ros.ros.intake.guard import MOST_TOLD, Guard
-from automax_ros.ros.intake.service_requests import Later, Respond, allow_later
+from automax_ros.ros.intake.guard import MOST_TOLD, RequestGuard
+from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred
 
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = "unconfigured", "inactive", "active", "finalized"
 """The states that last."""
@@ -59,7 +60,7 @@ class Pending:
     begin: Callable[[Done], None]
 
 
-class Duties(Protocol):
+class LifecycleCallbacks(Protocol):
     """What the transitions of a node do.
 
     Raises:
@@ -96,10 +97,12 @@ class Duties(Protocol):
         ...
 
 
-class Managed(LifecycleNodeMixin):  # type: ignore[misc]
+class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
     """Lets a node be managed; to be inherited from before a class of nodes, which is initialised first."""
 
-    def manage(self, duties: Duties, guard: Guard, enter: Callable[[Callable[[], None]], None]) -> None:
+    def manage(
+        self, duties: LifecycleCallbacks, guard: RequestGuard, enter: Callable[[Callable[[], None]], None]
+    ) -> None:
         """Offer the services of a lifecycle node; its state is unconfigured.
 
         Args:
@@ -111,7 +114,7 @@ class Managed(LifecycleNodeMixin):  # type: ignore[misc]
         self._duties, self._guard, self._enter = duties, guard, enter
         asked = self._service_change_state
         asked.callback = self._asked
-        allow_later(asked)
+        allow_deferred(asked)
         for service in (asked, self._service_get_state, *self._descriptions()):
             guard.service(service)
 
@@ -195,7 +198,7 @@ class Managed(LifecycleNodeMixin):  # type: ignore[misc]
 
             self._enter(lambda: self._try(name, done))
 
-        return Later(begin)
+        return DeferredResponse(begin)
 
     def _try(self, transition: str, done: Done) -> None:
         try:

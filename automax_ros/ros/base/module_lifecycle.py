@@ -22,10 +22,10 @@ from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.modules.module import Module
 from automax_ros.rack.operator.module_tasks import ModuleTasks
-from automax_ros.rack.operator.requests import Orders, ReloadRefused
-from automax_ros.rack.tasks.installation import Prepared
-from automax_ros.ros.base.lifecycle import ACTIVE, INACTIVE, UNCONFIGURED, Managed, Pending, TransitionRefused
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.rack.operator.requests import OperatorRequests, ReloadRefused
+from automax_ros.rack.tasks.installation import PreparedReload
+from automax_ros.ros.base.lifecycle import ACTIVE, INACTIVE, UNCONFIGURED, LifecycleNode, Pending, TransitionRefused
+from automax_ros.ros.base.node import ModuleNode, RackContext
 
 
 class Background:
@@ -69,14 +69,14 @@ DEACTIVATED = "the node rack was deactivated"
 _BEFORE_THE_RACK = "the rack has not been activated yet: activate its node rack first"
 
 
-class ManagedModuleNode(Managed, ModuleNode):
+class ManagedModuleNode(LifecycleNode, ModuleNode):
     """Serves one module and lets a lifecycle manager stop, delete, reload and run its tasks."""
 
-    def __init__(self, site: Site, module: Module) -> None:
+    def __init__(self, site: RackContext, module: Module) -> None:
         """Join the graph: the tasks are installed, so the node is inactive."""
         ModuleNode.__init__(self, site, module.config.name)
         self.work = Background(self)
-        self._duties_of_tasks = ModuleDuties(self, module)
+        self._duties_of_tasks = ModuleLifecycle(self, module)
         self.manage(self._duties_of_tasks, self.guard, self._enter)
         self.adopt_services()
         self.follow(INACTIVE)
@@ -100,16 +100,16 @@ class ManagedModuleNode(Managed, ModuleNode):
         super().destroy_node()
 
     def _enter(self, action: Callable[[], None]) -> None:
-        with self.site.present():
+        with self.site.between_scans():
             action()
 
 
-class ModuleDuties:
+class ModuleLifecycle:
     """What the transitions of a module's node do to its tasks."""
 
     def __init__(self, node: ManagedModuleNode, module: Module) -> None:
         self._node, self._site = node, node.site
-        self._tasks, self._orders = ModuleTasks(node.site.rack, module), Orders(node.site.rack)
+        self._tasks, self._orders = ModuleTasks(node.site.rack, module), OperatorRequests(node.site.rack)
 
     @property
     def state(self) -> str | None:
@@ -168,8 +168,8 @@ class ModuleDuties:
             return
         name = names[0]
 
-        def prepared(found: Prepared | None, error: Exception | None) -> None:
-            with self._site.present():
+        def prepared(found: PreparedReload | None, error: Exception | None) -> None:
+            with self._site.between_scans():
                 try:
                     if error is not None:
                         raise error

@@ -31,11 +31,11 @@ from automax_ros.messages.types.topics import Take, Topic
 from automax_ros.rack.rack import Rack
 from automax_ros.ros.base.diagnostics import Diagnostics, Source, status_of
 from automax_ros.ros.base.qos import message_class, ros_qos
-from automax_ros.ros.intake.guard import Guard
-from automax_ros.ros.intake.intake import Door
-from automax_ros.ros.intake.rack_lock import Turns
+from automax_ros.ros.intake.guard import RequestGuard
+from automax_ros.ros.intake.intake import MessageIntake
+from automax_ros.ros.intake.rack_lock import RackLock
 from automax_ros.ros.intake.rcl import library
-from automax_ros.ros.intake.service_requests import ServiceWay
+from automax_ros.ros.intake.service_requests import ServiceRequests
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.parameter_files import RosArgumentsError
 from automax_ros.runtime.health import Health
@@ -48,10 +48,10 @@ SIM_TIME = "use_sim_time"
 _OF_RCLPY = (SIM_TIME, "start_type_description_service")
 
 
-class GuardedNode(Node):  # type: ignore[misc]
+class RackRosNode(Node):  # type: ignore[misc]
     """A node with a guard for the services that rclpy gives it."""
 
-    _door: Door | None = None
+    _door: MessageIntake | None = None
 
     def __init__(
         self, name: str, namespace: str, context: Context, health: Health, arguments: RosArguments = NO_ARGUMENTS
@@ -67,7 +67,7 @@ class GuardedNode(Node):  # type: ignore[misc]
         own_place = ["--ros-args", "-r", f"__ns:={space}", "-r", f"__node:={name}"]
         super().__init__(name, namespace=space, context=context, cli_args=own_place, parameter_overrides=own_time)
         self.add_on_set_parameters_callback(partial(_keep_time, follows))
-        self.guard = Guard(health, self.get_logger().error)
+        self.guard = RequestGuard(health, self.get_logger().error)
         self.guard.services(self)
 
     def declare_facts(self, facts: Mapping[str, tuple[bool | int | float | str, str]]) -> None:
@@ -86,7 +86,7 @@ class GuardedNode(Node):  # type: ignore[misc]
                 return SetParametersResult(successful=False, reason=f"{reason}: {hint}" if hint else reason)
         return super().set_parameters_atomically(parameter_list)
 
-    def served_by(self, door: Door) -> None:
+    def served_by(self, door: MessageIntake) -> None:
         """Let requests come in at a door, to services that are created later too; before an executor has the node.
 
         Where rcl is not found an executor serves them, as ever.
@@ -101,7 +101,7 @@ class GuardedNode(Node):  # type: ignore[misc]
             return
         for service in self.services:
             self._adopted.add(service)
-            self._door.add(ServiceWay(rcl, service, partial(self.guard.refusal, service.srv_name)))
+            self._door.add(ServiceRequests(rcl, service, partial(self.guard.refusal, service.srv_name)))
 
     @property
     def services(self) -> Iterator[Any]:
@@ -138,7 +138,7 @@ def _keep_time(follows: bool, parameters: list[Parameter[Any]]) -> SetParameters
 
 
 @dataclass(frozen=True)
-class Site:
+class RackContext:
     """One rack that lives in this process, as its nodes see it.
 
     Attributes:
@@ -158,28 +158,28 @@ class Site:
     pacer: Pace
     context: Context
     health: Health
-    door: Door
+    door: MessageIntake
     arguments: RosArguments = NO_ARGUMENTS
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
-    lock: Turns = field(default_factory=Turns)
+    lock: RackLock = field(default_factory=RackLock)
 
     @property
-    def is_home(self) -> bool:
+    def holds_common_memory(self) -> bool:
         """Whether common memory is in this process."""
-        return self.rack.part.is_home
+        return self.rack.part.holds_common_memory
 
     @contextmanager
-    def present(self) -> Iterator[None]:
+    def between_scans(self) -> Iterator[None]:
         """Enter the rack from outside: between two scans, and what happens is stamped with its own instant."""
         with self.lock:
             self.pacer.catch_up()
             yield
 
 
-class ModuleNode(GuardedNode):
+class ModuleNode(RackRosNode):
     """A module's node: in the rack's namespace, on its time, and safe from what clients ask of its parameters."""
 
-    def __init__(self, site: Site, name: str) -> None:
+    def __init__(self, site: RackContext, name: str) -> None:
         """Join the graph."""
         super().__init__(name, site.rack.config.namespace, site.context, site.health, site.arguments)
         self.site = site
@@ -188,13 +188,13 @@ class ModuleNode(GuardedNode):
     @property
     def subscriptions(self) -> Iterator[Any]:
         """What an executor serves: not what is taken at the rack's door."""
-        return (item for item in super().subscriptions if item.callback is not _at_the_door)
+        return (item for item in super().subscriptions if item.callback is not _no_callback)
 
     def own_subscription(
         self, kind: Any, topic: str, qos: QoSProfile, events: SubscriptionEventCallbacks | None = None
     ) -> Any:
         """Return a subscription that no executor serves, for the rack's door; ``kind`` is the message's class."""
-        return self.create_subscription(kind, topic, _at_the_door, qos, event_callbacks=events, raw=True)
+        return self.create_subscription(kind, topic, _no_callback, qos, event_callbacks=events, raw=True)
 
     def outlet(self, topic: Topic, joined: Callable[[], None] | None = None) -> Take:
         """Return what publishes the messages of a topic. ``joined`` is called for each reader that comes."""
@@ -207,8 +207,8 @@ class ModuleNode(GuardedNode):
             self.misfit(f"a reader of {topic.name} gets nothing", info)
 
         events = PublisherEventCallbacks(
-            matched=self.inside(topic.name, matched) if joined is not None else None,
-            incompatible_qos=self.inside(topic.name, incompatible),
+            matched=self.guarded_callback(topic.name, matched) if joined is not None else None,
+            incompatible_qos=self.guarded_callback(topic.name, incompatible),
         )
         kind = message_class(topic.type_name)
         publish = self.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events).publish
@@ -234,11 +234,11 @@ class ModuleNode(GuardedNode):
         self.site.health.note("QoS conflict", what, lambda: text, times=info.total_count_change)
         self.get_logger().warning(text)
 
-    def inside(self, what: str, action: Callable[..., None]) -> Callable[..., None]:
+    def guarded_callback(self, what: str, action: Callable[..., None]) -> Callable[..., None]:
         """Return an action as a callback: in the rack's present, between two scans, its exceptions reported."""
 
         def entered(*arguments: Any) -> None:
-            with self.site.present():
+            with self.site.between_scans():
                 try:
                     action(*arguments)
                 except Exception as error:
@@ -247,5 +247,5 @@ class ModuleNode(GuardedNode):
         return entered
 
 
-def _at_the_door(_: Any) -> None:
+def _no_callback(_: Any) -> None:
     """Stand in for the callback of a subscription that is taken from at the rack's door."""

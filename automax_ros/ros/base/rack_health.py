@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from automax_ros.core.text import count_of
 from automax_ros.rack.operator.halting import is_halted
 from automax_ros.ros.base.diagnostics import status_of
-from automax_ros.ros.base.node import Site
+from automax_ros.ros.base.node import RackContext
 from automax_ros.runtime.tasks.task import Status
 
 OVERRUNS = "overruns"
@@ -23,7 +23,7 @@ class RackHealth:
     were skipped or something was refused since the last report; else OK.
     """
 
-    def __init__(self, site: Site, part: str) -> None:
+    def __init__(self, site: RackContext, part: str) -> None:
         """Take a rack; ``part`` is what the status is called, without the rack's namespace."""
         self._site, self._part = site, part
 

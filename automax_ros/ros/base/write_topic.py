@@ -19,7 +19,7 @@ from automax_ros.rackfile.reading.scale import Scale
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
-from automax_ros.ros.intake.raw_messages import Senders, Taken, taker_of
+from automax_ros.ros.intake.raw_messages import RawMessage, SequenceTracker, taker_of
 from automax_ros.ros.intake.rcl import library
 from automax_ros.runtime.memory.views import MemoryValueError
 
@@ -32,7 +32,7 @@ DROPPED = "dropped message"
 """What ``Health`` counts: messages that DDS dropped, for more came than the door takes."""
 
 
-class Inlet:
+class WriteTopic:
     """Hears a topic's messages from reliable and best-effort publishers; ``take`` is called between two scans.
 
     Messages wait in DDS, ten of them at most, and are taken at the rack's door (``Door``) as bytes: what is longer than
@@ -54,11 +54,13 @@ class Inlet:
             most_bytes: size of the longest message that makes sense, without its header of 4 bytes.
         """
         self._node, self._topic, self._type_name = node, topic, type_name
-        self._take = node.inside(topic, take)
+        self._take = node.guarded_callback(topic, take)
         self._class, self._most_bytes = message_class(type_name), len(b"\0\1\0\0") + most_bytes + MAX_TRAILING
         self._hears_best_effort = self._is_best_effort = False
-        self._throttle, self._senders = Throttle(REFUSAL_INTERVAL_S), Senders()
-        self._subscribe(COMMAND, SubscriptionEventCallbacks(incompatible_qos=node.inside(topic, self._not_heard)))
+        self._throttle, self._senders = Throttle(REFUSAL_INTERVAL_S), SequenceTracker()
+        self._subscribe(
+            COMMAND, SubscriptionEventCallbacks(incompatible_qos=node.guarded_callback(topic, self._not_heard))
+        )
 
     def refuse(self, of: str, reason: Exception) -> None:
         """Tell, not too often, that a message was not taken; ``of`` is what it would have written."""
@@ -78,7 +80,7 @@ class Inlet:
             self._hears_best_effort = True
             self._subscribe(BEST_EFFORT_COMMAND, None)
 
-    def receive(self, taken: Taken, *, reliable: bool) -> None:
+    def receive(self, taken: RawMessage, *, reliable: bool) -> None:
         """Deal with a message that was taken."""
         if taken.sender:
             missing = self._senders.missing(taken)
@@ -109,7 +111,7 @@ class Inlet:
 class _Way:
     """One of an inlet's two subscriptions, as the door serves it."""
 
-    def __init__(self, inlet: Inlet, subscription: Any, most_bytes: int, *, reliable: bool) -> None:
+    def __init__(self, inlet: WriteTopic, subscription: Any, most_bytes: int, *, reliable: bool) -> None:
         self.name, self.handle = subscription.topic_name, subscription.handle
         self._inlet, self._reliable = inlet, reliable
         self._taker = taker_of(subscription, most_bytes)
@@ -128,7 +130,7 @@ class _Way:
         return int(rcl.on_message(pointer, callback, data))
 
 
-class ScaledInput:
+class ScaledWriter:
     """The counts of what one topic writes to a variable. Beyond the scale a value is clamped, and told once."""
 
     def __init__(self, node: ModuleNode, topic: str, variable: CommonVariable, scale: Scale, unit: str) -> None:

@@ -26,9 +26,9 @@ from automax_ros.messages.types.definitions import message_types
 from automax_ros.messages.types.messages import Clock
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.mcap_file import RawMessage
-from automax_ros.recordings.read.playback import PlayTopic, Renaming, Survey
+from automax_ros.recordings.read.playback import PlayableRecording, PlayTopic, Renaming
 from automax_ros.ros.base.qos import message_class, ros_qos
-from automax_ros.ros.intake.guard import Guard
+from automax_ros.ros.intake.guard import RequestGuard
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.process import joined_context, make_executor
 from automax_ros.runtime.health import Health
@@ -76,7 +76,7 @@ class Player:
 
     def __init__(
         self,
-        survey: Survey,
+        survey: PlayableRecording,
         renaming: Renaming,
         rate: float,
         *,
@@ -94,7 +94,7 @@ class Player:
         self._node.create_service(Trigger, "~/pause", self._pause)
         self._node.create_service(Trigger, "~/resume", self._resume)
         self.health = Health()
-        self._guard = Guard(self.health, self._node.get_logger().error)
+        self._guard = RequestGuard(self.health, self._node.get_logger().error)
         self._guard.services(self._node)
         self._executor = make_executor(self._context)
         self._executor.add_node(self._node)

@@ -11,7 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.ros.clients import recorded_run as participants
 from automax_ros.ros.clients.recorded_run import racks_of
@@ -26,7 +26,7 @@ _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _HOME, _OPERATOR = "common_memory", "operator"
 
 
-class NotOperable(Fault):
+class NotOperable(UserError):
     """There is no such rack, it has no operator, there are several of the name, or it does not answer."""
 
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from rclpy.node import Node
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.ros.intake.raw_messages import Taken
+from automax_ros.ros.intake.raw_messages import RawMessage
 from automax_ros.ros.intake.rcl import library
 
 PREFIX_BYTES = 12
@@ -66,14 +66,14 @@ MOST_PROCESSES = 64
 
 
 @dataclass
-class Stranger:
+class UnknownPublisher:
     """A program that is not known to be the rack's: since when (ns), and how much it sent on each topic."""
 
     since_ns: int
     sent: Counter[str] = field(default_factory=Counter)
 
 
-class Binding:
+class RecordedRun:
     """The programs of one run of one rack."""
 
     def __init__(self, node: Node, space: str) -> None:
@@ -83,8 +83,8 @@ class Binding:
         self._others: set[bytes] = set()
         self._last_ns = self._next_ns = 0
         self._has_rival = False
-        self._tables: dict[bytes, Taken] = {}
-        self._strangers: dict[bytes, Stranger] = {}
+        self._tables: dict[bytes, RawMessage] = {}
+        self._strangers: dict[bytes, UnknownPublisher] = {}
         self._told: set[str] = set()
         self.news: list[str] = []
         self.tells_senders = library() is not None
@@ -112,7 +112,7 @@ class Binding:
             self.news.append(f"another rack is called {self._space} too: it is not recorded")
         return not self.tells_senders or self._home in racks
 
-    def is_ours(self, topic: str, taken: Taken) -> bool:
+    def is_ours(self, topic: str, taken: RawMessage) -> bool:
         """Return whether a message comes from the rack; one of another's is counted and told."""
         if not self.tells_senders:
             return True
@@ -122,7 +122,7 @@ class Binding:
             return True
         if sender not in self._strangers and len(self._strangers) >= MOST_PROCESSES:
             sender = b""
-        self._strangers.setdefault(sender, Stranger(time.monotonic_ns())).sent[topic] += 1
+        self._strangers.setdefault(sender, UnknownPublisher(time.monotonic_ns())).sent[topic] += 1
         return False
 
     @property
@@ -141,14 +141,14 @@ class Binding:
                         f"left out what another program publishes on {topic}: it is not of the recorded rack"
                     )
 
-    def keep(self, table: Taken) -> None:
+    def keep(self, table: RawMessage) -> None:
         """Keep a table that is not ours: it may turn out to be that of the rack's next run."""
         self._tables[participant(table.sender)] = table
         if len(self._tables) > MOST_TABLES:
             racks = self.racks()
             self._tables = {sender: kept for sender, kept in self._tables.items() if sender in racks}
 
-    def successor(self) -> Taken | None:
+    def successor(self) -> RawMessage | None:
         """Return the table of the rack's next run once there is one: ours has gone, or is silent."""
         now = time.monotonic_ns()
         if not self._tables or now < self._next_ns:

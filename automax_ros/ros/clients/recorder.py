@@ -25,7 +25,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.messages.cdr.cdr import CdrError, decode
 from automax_ros.messages.cdr.message_headers import table_of
@@ -33,14 +33,14 @@ from automax_ros.messages.types.messages import Presence, VariableTable
 from automax_ros.messages.types.rack_files import RackFile, RackFilesError, files_from_text
 from automax_ros.messages.types.topics import LATCHED, SCAN
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.recordings.live.arrival import ArrivalOrder
+from automax_ros.recordings.live.arrival import SendOrder
 from automax_ros.recordings.live.recording import LiveRecording
 from automax_ros.recordings.live.topics import LiveTopics, TopicKind
 from automax_ros.recordings.write.data_file import StorageOptions
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class
-from automax_ros.ros.clients.recorded_run import MOST_TABLES, Binding, participant
-from automax_ros.ros.intake.raw_messages import Taken, taker_of
+from automax_ros.ros.clients.recorded_run import MOST_TABLES, RecordedRun, participant
+from automax_ros.ros.intake.raw_messages import RawMessage, taker_of
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.process import joined_context
 
@@ -51,7 +51,7 @@ _LOOK_NS = 100 * NS_PER_MS
 class RecorderWait:
     """Looks for the recorder of one process."""
 
-    def __init__(self, site: Site, node: ModuleNode, *others: str) -> None:
+    def __init__(self, site: RackContext, node: ModuleNode, *others: str) -> None:
         """Look for readers of what the stream of this process sends, and of ``others``, topics of the rack."""
         self._node = node
         self._space, self._name = f"/{site.rack.config.namespace}", recorder_name(site.arguments)
@@ -92,7 +92,7 @@ _FILES = TopicKind("std_msgs/msg/String", LATCHED)
 _PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
 
 
-class SeveralRacks(Fault):
+class SeveralRacks(UserError):
     """Several racks have one name in this ROS domain."""
 
 
@@ -118,7 +118,7 @@ class RawSubscription:
         self._subscription = node.create_subscription(self._class, topic, _nothing, qos, raw=True)
         self._taker = taker_of(self._subscription, MOST_BYTES)
 
-    def taken(self) -> Iterator[Taken]:
+    def taken(self) -> Iterator[RawMessage]:
         """Return the messages that have come; one that is longer than any of a rack's has no bytes."""
         while (found := self._taker.take()) is not None:
             yield found
@@ -167,7 +167,7 @@ class LiveRecorder:
         self._node = RecorderNode(space, self._context, recorder_name(arguments))
         self._topics = LiveTopics(space)
         self._table = b""
-        self._order: ArrivalOrder[tuple[str, bytes]] = ArrivalOrder(HOLD_NS)
+        self._order: SendOrder[tuple[str, bytes]] = SendOrder(HOLD_NS)
         self._subscriptions: list[RawSubscription] = []
         self._files: RawSubscription | None = None
         self._numbers: dict[str, int] = {}
@@ -176,7 +176,7 @@ class LiveRecorder:
         self._next_knock = 0
         self._knock_count = 0
         self._files_begun = 1
-        self.binding = Binding(self._node, space)
+        self.binding = RecordedRun(self._node, space)
         self._presences: RawSubscription | None = None
         self._early: dict[str, RawSubscription] = {}
         self._run_id = 0
@@ -210,7 +210,7 @@ class LiveRecorder:
         """
         topic = self._topics.variables
         source = self._early.pop(topic, None) or RawSubscription(self._node, topic, self._topics.all[topic])
-        tables: dict[bytes, Taken] = {}
+        tables: dict[bytes, RawMessage] = {}
         deadline = time.monotonic_ns() + wait_ns
         try:
             while not stopping() and time.monotonic_ns() < deadline:
@@ -228,7 +228,7 @@ class LiveRecorder:
             source.close()
         return None
 
-    def _bound_to(self, found: Taken) -> VariableTable:
+    def _bound_to(self, found: RawMessage) -> VariableTable:
         self.binding.bind(found.sender)
         self._table = found.payload or b""
         table = table_of(self._table)
@@ -298,7 +298,7 @@ class LiveRecorder:
             self.recording.flush(now - self._last_due)
         if now >= self._next_knock or self.recording.files_begun > self._files_begun:
             self._files_begun = self.recording.files_begun
-            self._knock(now)
+            self._request_image(now)
 
     def finish(self) -> None:
         """Take and record what is still there, and finish the bag; a disk that refuses is the recording's failure."""
@@ -328,7 +328,7 @@ class LiveRecorder:
                     self._count_lost(topic, found.number)
                 self._order.add(found.sent_ns, (topic, found.payload or b""))
 
-    def _ours(self, subscription: RawSubscription) -> Iterator[Taken]:
+    def _ours(self, subscription: RawSubscription) -> Iterator[RawMessage]:
         """Return what has come from the rack."""
         topic, binding = subscription.topic, self.binding
         for found in subscription.taken():
@@ -365,7 +365,7 @@ class LiveRecorder:
         if number:
             self._numbers[topic] = number
 
-    def _knock(self, now: int) -> None:
+    def _request_image(self, now: int) -> None:
         """Ask the rack for what recording waits for: it answers a further reader as it answered the first."""
         assert self.recording is not None
         for knock in self._knocks:

@@ -23,7 +23,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.qos import LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import DataType
 from automax_ros.messages.bus.bus import (
@@ -38,17 +38,17 @@ from automax_ros.messages.bus.bus import (
     with_standing,
     write_message,
 )
-from automax_ros.messages.bus.peers import BEAT_NS, Heard, Peer, Peers
+from automax_ros.messages.bus.peers import BEAT_NS, Peer, Peers, PresenceVerdict
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Stage
-from automax_ros.rack.distributed.link import Batch, BusLink, Picture
+from automax_ros.rack.distributed.link import Batch, ImageCopy, ImageSync
 from automax_ros.rackfile.model.config import ModuleLoss
 from automax_ros.rackfile.model.driven import driven_plants
 from automax_ros.rackfile.processes import part_name
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import ros_qos
 from automax_ros.ros.clients.recorder import RecorderWait
-from automax_ros.ros.distributed.bus_topics import BusWay, Terms
+from automax_ros.ros.distributed.bus_topics import BusTopic, Terms
 from automax_ros.ros.distributed.process_watch import ProcessWatch, this_host
 from automax_ros.runtime.health import FROM_STRANGERS
 
@@ -73,34 +73,34 @@ FOR_ALL = 0
 """Asked by nobody: an image of what a process that was lost has written last, which some may not have."""
 
 
-class SeatTaken(Fault):
+class ProcessAlreadyRuns(UserError):
     """Another process of this run has the same modules."""
 
 
 @dataclass(frozen=True)
-class Seating:
+class ProcessLayout:
     """How a rack is cut into processes.
 
     ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the one that is there. ``is_common``
-    says whether what happens now happens in every process by itself, as stimuli do. ``lead_ns``: so far the start
-    lies ahead of the moment at which all are there, as the home says it. ``awaits_recorder``: it waits for one that
-    hears this process.
+    says whether what happens now happens in every process by itself, as stimuli do. ``start_delay_ns``: so far the
+    start lies ahead of the moment at which all are there, as the home says it. ``awaits_recorder``: it waits for
+    one that hears this process.
     """
 
     seats: Sequence[tuple[int, ...]]
     run_id: int = 0
     is_common: Callable[[], bool] = lambda: False
-    lead_ns: int = LEAD_NS
+    start_delay_ns: int = LEAD_NS
     awaits_recorder: bool = False
 
 
-class RackBus:
+class DistributedMemory:
     """The bus as one process has it. ``fault`` is why the process cannot take part, if it cannot.
 
     ``seats`` are the slots of all processes by the slot that names each, ``plants`` the slots whose drives turn them.
     """
 
-    def __init__(self, site: Site, node: ModuleNode, seating: Seating) -> None:
+    def __init__(self, site: RackContext, node: ModuleNode, seating: ProcessLayout) -> None:
         """Join the bus.
 
         Raises:
@@ -115,12 +115,12 @@ class RackBus:
         self._limits = BusLimits(self.seats)
         self.plants = {item.name: item.slot for item in driven_plants(rack.config)}
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
-        self._watch, self._lead_ns = ProcessWatch(), seating.lead_ns
+        self._watch, self._lead_ns = ProcessWatch(), seating.start_delay_ns
         self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
-        self.link = BusLink(rack, min(own), self._send, seating.is_common, self._guarded)
+        self.link = ImageSync(rack, min(own), self._send, seating.is_common, self._guarded)
         self._recorder = RecorderWait(site, node, PRESENCE) if seating.awaits_recorder else None
         self.stage, self.joining = Stage.JOINING, False
-        self.fault: SeatTaken | None = None
+        self.fault: ProcessAlreadyRuns | None = None
         self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
         self._begun = self._has_image = False
         self._waiting: list[Callable[[], None]] = []
@@ -136,7 +136,7 @@ class RackBus:
         self._hear("bus/image", qos, BusImage, self._take_image, Terms(MOST_BYTES))
         self._hear(PRESENCE, presence_qos(), Presence, self._take_presence, words)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(BEAT_NS / NS_PER_S, node.inside("the bus", self._beat), clock=steady)
+        node.create_timer(BEAT_NS / NS_PER_S, node.guarded_callback("the bus", self._beat), clock=steady)
 
     @property
     def run_id(self) -> int:
@@ -214,7 +214,7 @@ class RackBus:
         self._answered[asked_by] = now
         self._show(self.link.picture(), asked_by)
 
-    def _show(self, picture: Picture, asked_by: int) -> None:
+    def _show(self, picture: ImageCopy, asked_by: int) -> None:
         message = image_message(picture, self._rack.now_ns, self.run_id, self.peers.process, asked_by)
         self._images.publish(encode(message))
 
@@ -230,9 +230,14 @@ class RackBus:
 
     def _advance(self, now: int) -> None:
         peers = self.peers
-        if not peers.run_id and self._rack.part.is_home and not peers.by_seat and now - self._since_ns > ALONE_NS:
+        if (
+            not peers.run_id
+            and self._rack.part.holds_common_memory
+            and not peers.by_seat
+            and now - self._since_ns > ALONE_NS
+        ):
             peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
-        if not peers.run_id and self._rack.part.is_home and peers.by_seat and not any(peers.running()):
+        if not peers.run_id and self._rack.part.holds_common_memory and peers.by_seat and not any(peers.running()):
             peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
         if self._recorder is not None and self._recorder.is_over():
             self._recorder = None
@@ -245,7 +250,7 @@ class RackBus:
         elif not self.missing and peers.run_id:
             self.stage = Stage.READY
             others = [peer.stage == Stage.READY for peer in peers.by_seat.values()]
-            if self._rack.part.is_home and all(others):
+            if self._rack.part.holds_common_memory and all(others):
                 peers.epoch_ns = time.time_ns() + self._lead_ns
                 self.stage = Stage.RUNNING
 
@@ -276,8 +281,8 @@ class RackBus:
 
     def _hear(
         self, topic: str, qos: QoSProfile, kind: Any, receive: Callable[[Any, bytes], None], terms: Terms
-    ) -> BusWay:
-        return BusWay(self._node, topic, f"automax_msgs/msg/{kind.__name__}", qos, receive, self._refuse, terms)
+    ) -> BusTopic:
+        return BusTopic(self._node, topic, f"automax_msgs/msg/{kind.__name__}", qos, receive, self._refuse, terms)
 
     def _guarded(self, take: Callable[[], None]) -> None:
         try:
@@ -341,12 +346,12 @@ class RackBus:
             self._refuse(PRESENCE, wrong)
             return
         found = self.peers.heard(presence, time.monotonic_ns())
-        if found is Heard.OWN:
+        if found is PresenceVerdict.OWN:
             return
-        if found not in (Heard.KNOWN, Heard.NEW):
+        if found not in (PresenceVerdict.KNOWN, PresenceVerdict.NEW):
             self._strange(found, presence)
             return
-        if found is Heard.NEW:
+        if found is PresenceVerdict.NEW:
             self._participants[presence.process] = sender
         if presence.asks == self.peers.process:
             self._answer(presence.process)
@@ -364,14 +369,17 @@ class RackBus:
             with self._site.lock:
                 self.peers.missed(presence, time.monotonic_ns())
 
-    def _strange(self, found: Heard, presence: Presence) -> None:
+    def _strange(self, found: PresenceVerdict, presence: Presence) -> None:
         name = part_name(self._rack.config, presence.slots)
-        if found is Heard.SEAT_TAKEN and self.stage is Stage.JOINING and presence.state == Stage.RUNNING:
-            self.fault = SeatTaken(f"{name} of this run is there already", "stop it first, or leave it as it is")
+        if found is PresenceVerdict.SEAT_TAKEN and self.stage is Stage.JOINING and presence.state == Stage.RUNNING:
+            self.fault = ProcessAlreadyRuns(
+                f"{name} of this run is there already", "stop it first, or leave it as it is"
+            )
+        name_of_rack = self._rack.config.name
         texts = {
-            Heard.OTHER_RUN: f"another rack is called {self._rack.config.name}: its {name} is not of this run",
-            Heard.OTHER_FILE: f"{name} has another rack file or other sources: it is not of this run",
-            Heard.SEAT_TAKEN: f"a second process has {name}",
+            PresenceVerdict.OTHER_RUN: f"another rack is called {name_of_rack}: its {name} is not of this run",
+            PresenceVerdict.OTHER_FILE: f"{name} has another rack file or other sources: it is not of this run",
+            PresenceVerdict.SEAT_TAKEN: f"a second process has {name}",
         }
         self._site.health.note("other rack", (found, presence.process), lambda: texts[found], most=FROM_STRANGERS)
 

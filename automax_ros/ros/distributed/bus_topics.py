@@ -33,7 +33,7 @@ class Terms:
     then: Callable[[Any], None] | None = None
 
 
-class BusWay:
+class BusTopic:
     """One topic of the bus. ``refuse`` is told what is not a message of it, or too long."""
 
     def __init__(
@@ -50,7 +50,7 @@ class BusWay:
         subscription = node.own_subscription(message_class(type_name), topic, qos)
         self.name, self.handle = subscription.topic_name, subscription.handle
         self._topic, self._type_name, self._then = topic, type_name, terms.then
-        self._receive, self._refuse = node.inside(topic, receive), refuse
+        self._receive, self._refuse = node.guarded_callback(topic, receive), refuse
         self._taker = taker_of(subscription, terms.most_bytes)
         node.site.door.add(self, share=terms.share)
 

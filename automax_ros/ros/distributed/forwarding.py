@@ -1,8 +1,8 @@
 """Passes an operator's requests on to the processes of a distributed rack that hold what they are about.
 
 The operator asks in the process of common memory, as if the rack were in one piece. Each other process serves the same
-services under its first node, ``processor_3/operate/run``; ``Forwarding`` finds whom a request concerns, asks them all
-at once and answers when all have answered, or after ``ANSWER_S``.
+services under its first node, ``processor_3/operate/run``; ``RequestForwarder`` finds whom a request concerns, asks
+them all at once and answers when all have answered, or after ``ANSWER_S``.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.text import quoted
 from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.node import ModuleNode
-from automax_ros.ros.distributed.bus import RackBus
-from automax_ros.ros.intake.service_requests import Later, Respond
+from automax_ros.ros.distributed.bus import DistributedMemory
+from automax_ros.ros.intake.service_requests import DeferredResponse, Respond
 
 ANSWER_S = 2.0
 """How long another process is waited for."""
@@ -26,7 +26,7 @@ FIND_S = 0.02
 """How often a service that is not known yet is looked for."""
 RELOAD_ANSWER_S = 60.0
 """The same where it has to compile."""
-HERE = -1
+THIS_PROCESS = -1
 """This process, among those that a request concerns."""
 NOT_TOGETHER = "a rack of several processes keeps the wall clock: it cannot be halted or stepped"
 """Why some requests are refused (decision)."""
@@ -40,27 +40,27 @@ def operate_name(module: str, service: str) -> str:
 
 
 @dataclass(frozen=True)
-class Share:
-    """What one process is asked: its seat, ``HERE`` for this one, and the request."""
+class Target:
+    """What one process is asked: its seat, ``THIS_PROCESS`` for this one, and the request."""
 
     seat: int
     request: Any
 
 
-class Forwarding:
+class RequestForwarder:
     """Forwards the requests of one node, that of the operator. ``bus`` knows who is there.
 
     ``reloaded`` is called when the source of a task elsewhere is another.
     """
 
-    def __init__(self, node: ModuleNode, bus: RackBus, reloaded: Callable[[], None]) -> None:
+    def __init__(self, node: ModuleNode, bus: DistributedMemory, reloaded: Callable[[], None]) -> None:
         """Find out which process holds what."""
         self._reloaded = reloaded
         config = node.site.rack.config
         self._node, self._bus, self._config = node, bus, config
         home = bus.peers.seat
         self._seats = [seat for seat in bus.seats if seat != home]
-        seat_of = {slot: HERE if seat == home else seat for seat, slots in bus.seats.items() for slot in slots}
+        seat_of = {slot: THIS_PROCESS if seat == home else seat for seat, slots in bus.seats.items() for slot in slots}
         self._tasks = {task.name: seat_of[module.slot] for module, task in config.placed_tasks}
         self._slots = {str(slot): seat for slot, seat in seat_of.items()}
         self._plants = dict(bus.plants)
@@ -71,18 +71,20 @@ class Forwarding:
         if service in _NOT_TOGETHER:
             return _refused(response, NOT_TOGETHER)
         shares = _SHARING.get(service, _mine)(self, request, kind)
-        if [share.seat for share in shares] == [HERE]:
+        if [share.seat for share in shares] == [THIS_PROCESS]:
             return local(shares[0].request, response)
-        absent = [self._name(share.seat) for share in shares if share.seat not in (HERE, *self._bus.peers.by_seat)]
+        absent = [
+            self._name(share.seat) for share in shares if share.seat not in (THIS_PROCESS, *self._bus.peers.by_seat)
+        ]
         if absent and len(shares) == 1:
             return _refused(response, f"{absent[0]} is not there: start its process again")
         answers: dict[int, Any] = {share.seat: None for share in shares}
         for share in shares:
-            if share.seat == HERE:
-                answers[HERE] = local(share.request, kind.Response())
+            if share.seat == THIS_PROCESS:
+                answers[THIS_PROCESS] = local(share.request, kind.Response())
 
         def begin(respond: Respond) -> None:
-            _Round(self, service, kind, shares, answers, lambda: respond(end()))
+            _PendingRequest(self, service, kind, shares, answers, lambda: respond(end()))
 
         def end() -> Any:
             silent = [self._name(share.seat) for share in shares if answers[share.seat] is None]
@@ -91,7 +93,7 @@ class Forwarding:
                 self._note_source(request)
             return found
 
-        return Later(begin)
+        return DeferredResponse(begin)
 
     def _note_source(self, request: Any) -> None:
         """Keep what a task elsewhere runs from now on: whoever records the rack asks here for its files."""
@@ -119,30 +121,30 @@ class Forwarding:
 
     def seat_of_task(self, text: str) -> int:
         """Return the process that runs a task; this one for a name that the rack does not have, to say so."""
-        return self._tasks.get(text.strip().upper(), HERE)
+        return self._tasks.get(text.strip().upper(), THIS_PROCESS)
 
     def seat_of_name(self, text: str) -> int:
         """Return the process that holds ``TASK.NAME``, this one for common variables."""
         task, point, _ = text.partition(".")
-        return self.seat_of_task(task) if point else HERE
+        return self.seat_of_task(task) if point else THIS_PROCESS
 
     def seat_of_slot(self, text: str) -> int:
         """Return the process that has the module in a slot."""
-        return self._slots.get(text.strip(), HERE)
+        return self._slots.get(text.strip(), THIS_PROCESS)
 
     def seat_of_plant(self, text: str) -> int:
         """Return the process that has a plant."""
-        return self._slots.get(str(self._plants.get(text.strip().upper(), "")), HERE)
+        return self._slots.get(str(self._plants.get(text.strip().upper(), "")), THIS_PROCESS)
 
-    def everybody(self, request: Any) -> list[Share]:
+    def everybody(self, request: Any) -> list[Target]:
         """Return a request for all processes."""
-        return [Share(HERE, request), *(Share(seat, request) for seat in self._seats)]
+        return [Target(THIS_PROCESS, request), *(Target(seat, request) for seat in self._seats)]
 
     def _name(self, seat: int) -> str:
         return part_name(self._config, self._bus.seats[seat]) if seat in self._bus.seats else quoted(str(seat))
 
 
-class _Round:
+class _PendingRequest:
     """One request on its way: waits for all answers, at most a time.
 
     A process is asked once its service is known here: DDS drops a request that is sent before.
@@ -150,15 +152,15 @@ class _Round:
 
     def __init__(
         self,
-        forwarding: Forwarding,
+        forwarding: RequestForwarder,
         service: str,
         kind: Any,
-        shares: Sequence[Share],
+        shares: Sequence[Target],
         answers: dict[int, Any],
         done: Callable[[], None],
     ) -> None:
         self._answers, self._done, self._node = answers, done, forwarding.node
-        asked = [share for share in shares if share.seat != HERE and forwarding.is_there(share.seat)]
+        asked = [share for share in shares if share.seat != THIS_PROCESS and forwarding.is_there(share.seat)]
         self._open = {share.seat for share in asked}
         self._unasked = [(share, forwarding.client(share.seat, service, kind)) for share in asked]
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -183,7 +185,7 @@ class _Round:
                 self._unasked.append((share, client))
 
     def _answered(self, seat: int, future: Any) -> None:
-        with self._node.site.present():
+        with self._node.site.between_scans():
             if seat in self._open:
                 self._open.discard(seat)
                 self._answers[seat] = future.result()
@@ -201,7 +203,7 @@ class _Round:
 
 
 def _merged(
-    response: Any, request: Any, shares: Sequence[Share], answers: dict[int, Any], silent: Sequence[str]
+    response: Any, request: Any, shares: Sequence[Target], answers: dict[int, Any], silent: Sequence[str]
 ) -> Any:
     """Return one response: all lists one after the other, numbers of tasks added up, OK if all are.
 
@@ -261,51 +263,51 @@ def _concluded(response: Any, *, ok: bool, reason: str) -> Any:
     return response
 
 
-def _mine(_: Forwarding, request: Any, __: Any) -> list[Share]:
-    return [Share(HERE, request)]
+def _mine(_: RequestForwarder, request: Any, __: Any) -> list[Target]:
+    return [Target(THIS_PROCESS, request)]
 
 
-def _by_task(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+def _by_task(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
     """An empty name is all tasks."""
     if not request.task.strip():
         return forwarding.everybody(request)
-    return [Share(forwarding.seat_of_task(request.task), request)]
+    return [Target(forwarding.seat_of_task(request.task), request)]
 
 
-def _by_name(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
-    return [Share(forwarding.seat_of_name(request.name), request)]
+def _by_name(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
+    return [Target(forwarding.seat_of_name(request.name), request)]
 
 
-def _by_names(forwarding: Forwarding, request: Any, kind: Any) -> list[Share]:
+def _by_names(forwarding: RequestForwarder, request: Any, kind: Any) -> list[Target]:
     """Without names it is everything, wherever it is."""
     if not request.names:
         return forwarding.everybody(request)
     groups: dict[int, list[str]] = {}
     for name in request.names:
         groups.setdefault(forwarding.seat_of_name(name), []).append(name)
-    return [Share(seat, kind.Request(names=names)) for seat, names in groups.items()]
+    return [Target(seat, kind.Request(names=names)) for seat, names in groups.items()]
 
 
-def _by_slot(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
-    return [Share(forwarding.seat_of_slot(request.name), request)]
+def _by_slot(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
+    return [Target(forwarding.seat_of_slot(request.name), request)]
 
 
-def _by_plant(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
-    return [Share(forwarding.seat_of_plant(request.name), request)]
+def _by_plant(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
+    return [Target(forwarding.seat_of_plant(request.name), request)]
 
 
-def _everybody(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+def _everybody(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
     return forwarding.everybody(request)
 
 
-def _status(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
-    return [Share(HERE, request)] if request.home_only else forwarding.everybody(request)
+def _status(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
+    return [Target(THIS_PROCESS, request)] if request.home_only else forwarding.everybody(request)
 
 
 _ADDED = ("tasks", "running", "ended")
 """Numbers of a status that are those of one process each."""
 _NOT_TOGETHER = ("pause", "resume", "step")
-_SHARING: dict[str, Callable[[Forwarding, Any, Any], list[Share]]] = {
+_SHARING: dict[str, Callable[[RequestForwarder, Any, Any], list[Target]]] = {
     "run": _by_task,
     "stop": _by_task,
     "delete": _by_task,

@@ -16,9 +16,9 @@ from rclpy.qos import QoSProfile
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import Presence, Stage
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.distributed.bus import PRESENCE, presence_qos
-from automax_ros.ros.distributed.bus_topics import BusWay, Terms
+from automax_ros.ros.distributed.bus_topics import BusTopic, Terms
 from automax_ros.runtime.health import FROM_STRANGERS
 
 PERIOD_NS = NS_PER_S
@@ -26,17 +26,17 @@ PERIOD_NS = NS_PER_S
 _MOST_BYTES = 1 << 16
 
 
-class Herald:
+class PresencePublisher:
     """Speaks for a rack that is whole in this process."""
 
-    def __init__(self, site: Site, node: ModuleNode) -> None:
+    def __init__(self, site: RackContext, node: ModuleNode) -> None:
         """Join the graph; the first word comes after a second."""
         self._site, self._process = site, int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._publisher = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
         kind, terms = "automax_msgs/msg/Presence", Terms(_MOST_BYTES)
-        BusWay(node, PRESENCE, kind, QoSProfile(depth=10), self._heard, self._refuse, terms)
+        BusTopic(node, PRESENCE, kind, QoSProfile(depth=10), self._heard, self._refuse, terms)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(PERIOD_NS / NS_PER_S, node.inside(PRESENCE, self._tell), clock=steady)
+        node.create_timer(PERIOD_NS / NS_PER_S, node.guarded_callback(PRESENCE, self._tell), clock=steady)
 
     def _tell(self) -> None:
         rack, run_id = self._site.rack, self._site.stream.run_id

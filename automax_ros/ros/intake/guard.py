@@ -47,7 +47,7 @@ MOST_TOLD, MOST_LOGGED = 300, 20
 _LAST_TYPE = ParameterType.PARAMETER_STRING_ARRAY
 
 
-class Guard:
+class RequestGuard:
     """Reports what fails to ``health``, and the first failures to ``log``."""
 
     def __init__(self, health: Health, log: Callable[[str], object]) -> None:

@@ -57,7 +57,7 @@ class Entrance(Protocol):
         """Let rcl call a C function for what comes (or none); returns rcl's result."""
 
 
-class Door:
+class MessageIntake:
     """Takes what comes at the entrances, on a thread of its own between ``open`` and ``close``."""
 
     def __init__(self, report: Callable[[str, Exception], None]) -> None:

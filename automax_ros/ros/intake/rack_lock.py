@@ -14,7 +14,7 @@ _YIELD_S = 0.0001
 """How long a visitor stands aside for a scan that is due, s, before it looks again."""
 
 
-class Turns:
+class RackLock:
     """The rack's lock: ``with turns`` for a visitor, also within itself; ``with turns.scanner`` to scan."""
 
     def __init__(self) -> None:
@@ -23,7 +23,7 @@ class Turns:
         self._owner = 0
         self._depth = 0
         self._due = False
-        self.scanner = _Scanner(self)
+        self.for_scan = _Scanner(self)
 
     def __enter__(self) -> None:
         """Come in as a visitor: not while a scan waits."""
@@ -56,7 +56,7 @@ class Turns:
 class _Scanner:
     """The turn of the thread that scans."""
 
-    def __init__(self, turns: Turns) -> None:
+    def __init__(self, turns: RackLock) -> None:
         self._turns = turns
 
     def __enter__(self) -> None:

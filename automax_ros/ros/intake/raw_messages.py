@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 from automax_ros.ros.intake.rcl import OK, TAKE_FAILED, Bytes, Library, MessageInfo, library
 
 
-class Taken(NamedTuple):
+class RawMessage(NamedTuple):
     """A message: its bytes (none where it is longer than wanted), its size, when it was sent (ns, the sender's clock).
 
     ``number`` counts the sender's messages of the topic, 0 where that is not known; ``sender`` is the publisher's GID,
@@ -28,10 +28,10 @@ class Taken(NamedTuple):
     sender: bytes
 
 
-class Taker(Protocol):
+class RawReader(Protocol):
     """Takes the messages of one subscription."""
 
-    def take(self) -> Taken | None:
+    def take(self) -> RawMessage | None:
         """Return the next message, None where there is none.
 
         Raises:
@@ -40,7 +40,7 @@ class Taker(Protocol):
         """
 
 
-def taker_of(subscription: Any, most_bytes: int) -> Taker:
+def taker_of(subscription: Any, most_bytes: int) -> RawReader:
     """Return what takes the messages of a subscription of rclpy's; longer ones than ``most_bytes`` come without bytes.
 
     No executor may serve the subscription.
@@ -57,7 +57,7 @@ class _RclTaker:
         self._buffer, self._info = rcl.buffer(), MessageInfo()
         self._into, self._about = ctypes.addressof(self._buffer), ctypes.addressof(self._info)
 
-    def take(self) -> Taken | None:
+    def take(self) -> RawMessage | None:
         rcl, buffer, info = self._rcl, self._buffer, self._info
         with self._handle:
             result = rcl.take_serialized(self._handle.pointer, self._into, self._about, None)
@@ -69,7 +69,7 @@ class _RclTaker:
         size = buffer.length
         payload = self._copied(buffer) if size <= self._most_bytes else None
         rcl.give_back(buffer)
-        return Taken(payload, size, info.source_timestamp, info.publication_sequence_number, bytes(info.sender))
+        return RawMessage(payload, size, info.source_timestamp, info.publication_sequence_number, bytes(info.sender))
 
     @staticmethod
     def _copied(buffer: Bytes) -> bytes:
@@ -82,14 +82,16 @@ class _RclpyTaker:
     def __init__(self, subscription: Any, most_bytes: int) -> None:
         self._handle, self._class, self._most_bytes = subscription.handle, subscription.msg_type, most_bytes
 
-    def take(self) -> Taken | None:
+    def take(self) -> RawMessage | None:
         with self._handle:
             found = self._handle.take_message(self._class, True)
         if found is None:
             return None
         payload, info = found
         kept = payload if len(payload) <= self._most_bytes else None
-        return Taken(kept, len(payload), info["source_timestamp"], info.get("publication_sequence_number") or 0, b"")
+        return RawMessage(
+            kept, len(payload), info["source_timestamp"], info.get("publication_sequence_number") or 0, b""
+        )
 
 
 MOST_SENDERS = 64
@@ -98,14 +100,14 @@ MOST_MISSING = 1_000_000
 """A sender whose numbers leap further is not counted: numbers are what a stranger says."""
 
 
-class Senders:
+class SequenceTracker:
     """The number of the last message of each sender."""
 
     def __init__(self) -> None:
         """None has sent yet."""
         self._last: dict[bytes, int] = {}
 
-    def missing(self, taken: Taken) -> int | None:
+    def missing(self, taken: RawMessage) -> int | None:
         """Return how many messages of its sender did not come before this one; None where it has come already."""
         last = self._last.get(taken.sender)
         if last is None and len(self._last) >= MOST_SENDERS:

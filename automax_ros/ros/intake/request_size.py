@@ -29,7 +29,7 @@ a number 1. So 680 parameters, 3,800 texts, 65,000 numbers or 1 MB of text are t
 50 us for a parameter, 0.02 us for a text, 0.006 us for a number (measured on a busy machine)."""
 
 
-class TooHeavy(Exception):
+class RequestTooLarge(Exception):
     """A message is larger than a rack takes."""
 
 
@@ -52,7 +52,7 @@ _NUMBERS: dict[str, Any] = {
 Weigh = Callable[[Any], int]
 
 
-def weight(kind: Any, address: int) -> int:
+def request_size(kind: Any, address: int) -> int:
     """Return the weight of a message of a class at an address.
 
     Raises:
@@ -89,7 +89,9 @@ def _structure(kind: Any) -> tuple[Any, Weigh]:
             assert of_part is not None
             total += of_part(getattr(message, name))
             if total > MOST:
-                raise TooHeavy(f"it is larger than a rack takes: more than {MOST:,} as message_weight.py weighs it")
+                raise RequestTooLarge(
+                    f"it is larger than a rack takes: more than {MOST:,} as message_weight.py weighs it"
+                )
         return total
 
     return structure, weigh
@@ -112,7 +114,7 @@ def _part(slot: Any) -> tuple[Any, Weigh | None]:
 
     def of_sequence(found: _Many) -> int:
         if found.size * own > MOST:
-            raise TooHeavy(f"a sequence of {found.size:,} is longer than a rack takes")
+            raise RequestTooLarge(f"a sequence of {found.size:,} is longer than a rack takes")
         if of_items is None or not found.size:
             return int(found.size)
         return of_items((kind * found.size).from_address(found.data))
@@ -122,7 +124,7 @@ def _part(slot: Any) -> tuple[Any, Weigh | None]:
 
 def _of_text(found: _Many) -> int:
     if found.size > MOST * CHARACTERS:
-        raise TooHeavy(f"a text of {found.size:,} bytes is longer than a rack takes")
+        raise RequestTooLarge(f"a text of {found.size:,} bytes is longer than a rack takes")
     return int(OF_A_TEXT + found.size // CHARACTERS)
 
 
@@ -132,7 +134,7 @@ def _of_items(weigh: Weigh, own: int) -> Weigh:
         for item in items:
             total += own + weigh(item)
             if total > MOST:
-                raise TooHeavy(f"{len(items):,} items are larger than a rack takes")
+                raise RequestTooLarge(f"{len(items):,} items are larger than a rack takes")
         return total
 
     return of_items

@@ -7,7 +7,7 @@ whole before anybody is asked, on a thread of its own.
 
 Services that answer later: rclpy answers when a callback returns, and EventsExecutor awaits none.
 
-A callback returns ``Later``; its ``begin`` is called with what sends the response, at any later time, once.
+A callback returns ``DeferredResponse``; its ``begin`` is called with what sends the response, at any later time, once.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from dataclasses import dataclass
 from typing import Any
 
 from automax_ros.ros.intake.rcl import OK, TAKE_FAILED, Library, RequestId, ServiceInfo, capsule_pointer
-from automax_ros.ros.intake.request_size import sequences, weight
+from automax_ros.ros.intake.request_size import request_size, sequences
 
 Respond = Callable[[Any], None]
 """Sends a response."""
 
 
 @dataclass(frozen=True)
-class Later:
+class DeferredResponse:
     """Stands for a response that is not known yet."""
 
     begin: Callable[[Respond], None]
 
 
-def allow_later(service: Any) -> None:
-    """Let the callback of a service of rclpy's return ``Later``."""
+def allow_deferred(service: Any) -> None:
+    """Let the callback of a service of rclpy's return ``DeferredResponse``."""
     send = service.send_response
 
     def send_response(response: Any, header: Any) -> None:
-        if isinstance(response, Later):
+        if isinstance(response, DeferredResponse):
             response.begin(lambda found: send(found, header))
         else:
             send(response, header)
@@ -48,7 +48,7 @@ Refuse = Callable[[Any, Exception], Any]
 """Returns the response to a request that failed: the service's class, why."""
 
 
-class ServiceWay:
+class ServiceRequests:
     """The way in of one service of rclpy's."""
 
     def __init__(self, rcl: Library, service: Any, refuse: Refuse) -> None:
@@ -75,7 +75,7 @@ class ServiceWay:
                 raise ValueError(f"a malformed request (rcl returns {result})")
             header = RequestId.from_buffer_copy(self._info.request_id)
             try:
-                weight(self._kind.Request, raw)
+                request_size(self._kind.Request, raw)
                 request = self._request.read(raw)
                 response = self._service.callback(request, self._kind.Response())
             except Exception as error:
@@ -97,7 +97,7 @@ class ServiceWay:
             TypeError: it is not one of this service.
             RuntimeError: the middleware refuses it.
         """
-        if isinstance(response, Later):
+        if isinstance(response, DeferredResponse):
             response.begin(lambda found: self.respond(found, header))
             return
         if not isinstance(response, self._kind.Response):

@@ -24,10 +24,10 @@ from automax_ros.messages.types.topics import LATCHED, Take, Topic
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.rackfile.model.ros_names import set_topic
 from automax_ros.rackfile.model.writers import ROS_WRITER
-from automax_ros.ros.base.node import MAIN_NODE, ModuleNode, Site
+from automax_ros.ros.base.node import MAIN_NODE, ModuleNode, RackContext
 from automax_ros.ros.base.qos import ros_qos
 from automax_ros.ros.base.rack_health import RackHealth
-from automax_ros.ros.base.write_topic import Inlet, ScaledInput
+from automax_ros.ros.base.write_topic import ScaledWriter, WriteTopic
 from automax_ros.ros.nodes.joint_commands import joint_inlets
 from automax_ros.runtime.memory.views import MemoryValueError
 
@@ -39,7 +39,7 @@ _LAYOUT_BYTES = 1024
 class CommonMemoryNode(ModuleNode):
     """Serves the topics of common memory; its callbacks run between scans."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: RackContext) -> None:
         """Create publishers and subscriptions; messages flow once the stream begins."""
         super().__init__(site, "common_memory")
         rack, stream = site.rack, site.stream
@@ -74,7 +74,7 @@ class CommonMemoryNode(ModuleNode):
     def _module_health(self, _: int) -> list[DiagnosticStatus]:
         """Return the health of the module that holds common memory; a lone Processor tells its own."""
         rack = self.site.rack
-        module = next(item for item in rack.config.modules if item.slot == rack.config.home_slot)
+        module = next(item for item in rack.config.modules if item.slot == rack.config.common_memory_slot)
         if module.tick_ns:
             return []
         good = rack.operations.battery_good
@@ -97,8 +97,8 @@ class _ValueInlet:
     def __init__(self, node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
         self._node, self._view, self._variable = node, view, variable
         name, scale = set_topic(topic.name), variable.scale
-        self._scaled = None if scale is None else ScaledInput(node, name, variable, scale, variable.unit)
-        self._inlet = Inlet(node, name, topic.type_name, self._write, _most_bytes(variable))
+        self._scaled = None if scale is None else ScaledWriter(node, name, variable, scale, variable.unit)
+        self._inlet = WriteTopic(node, name, topic.type_name, self._write, _most_bytes(variable))
 
     def _write(self, message: Any) -> None:
         rack, scaled = self._node.site.rack, self._scaled

@@ -17,18 +17,18 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.modules.drive import Timed
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.modules.timed import Timed
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rackfile.model.driven import DrivenPlant
 from automax_ros.rackfile.model.ros_names import load_topic
-from automax_ros.ros.base.node import ModuleNode, Site
-from automax_ros.ros.base.write_topic import Inlet
+from automax_ros.ros.base.node import ModuleNode, RackContext
+from automax_ros.ros.base.write_topic import WriteTopic
 
 
 class DrivePlantNode(ModuleNode):
     """Serves the plant of one drive."""
 
-    def __init__(self, site: Site, driven: DrivenPlant) -> None:
+    def __init__(self, site: RackContext, driven: DrivenPlant) -> None:
         """Create publishers and, where ROS may load the shaft, the subscription."""
         super().__init__(site, "_".join(filter(None, ("drive_plant", str(driven.slot), driven.drive))))
         self._driven, self._plant = driven, site.rack.plants[driven.name]
@@ -37,9 +37,9 @@ class DrivePlantNode(ModuleNode):
         modules = {module.config.slot: module for module in site.rack.modules}
         module = modules[driven.slot]
         self._timing = module.timing if isinstance(module, Timed) else None
-        self._controls = Controls(site.rack)
+        self._controls = SwitchOperations(site.rack)
         if driven.config.load.from_ros:
-            self._inlet = Inlet(self, load_topic(driven.name), "std_msgs/msg/Float64", self._load, 8)
+            self._inlet = WriteTopic(self, load_topic(driven.name), "std_msgs/msg/Float64", self._load, 8)
         self.diagnose(self._health)
 
     def _load(self, message: Any) -> None:

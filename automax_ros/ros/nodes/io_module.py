@@ -9,13 +9,13 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from automax_ros.rack.modules.module import Module
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.node import ModuleNode, RackContext
 
 
 class IoModuleNode(ModuleNode):
     """Serves one I/O module."""
 
-    def __init__(self, site: Site, module: Module) -> None:
+    def __init__(self, site: RackContext, module: Module) -> None:
         """Create the publisher."""
         super().__init__(site, module.config.name)
         self._module = module.config

@@ -17,7 +17,7 @@ from automax_ros.rackfile.model.ros_names import command_topic
 from automax_ros.rackfile.model.writers import ROS_WRITER
 from automax_ros.rackfile.sections.joint_keys import INTERFACES, UNITS
 from automax_ros.ros.base.node import ModuleNode
-from automax_ros.ros.base.write_topic import Inlet, ScaledInput
+from automax_ros.ros.base.write_topic import ScaledWriter, WriteTopic
 from automax_ros.runtime.memory.views import MemoryValueError
 
 TYPE = "std_msgs/msg/Float64MultiArray"
@@ -35,8 +35,8 @@ class JointInlet:
         self._view, self._variable = _place(variables, command.common)
         topic = f"/{node.site.rack.config.namespace}/{command_topic(command.joint, command.interface)}"
         unit = UNITS[command.interface]
-        self._scaled = ScaledInput(node, topic, self._variable, command.scale, unit) if command.scale else None
-        self._inlet = Inlet(node, topic, TYPE, self._write, MOST_BYTES)
+        self._scaled = ScaledWriter(node, topic, self._variable, command.scale, unit) if command.scale else None
+        self._inlet = WriteTopic(node, topic, TYPE, self._write, MOST_BYTES)
 
     def _write(self, message: Any) -> None:
         rack, variable = self._node.site.rack, self._variable

@@ -22,11 +22,11 @@ from automax_ros.messages.types.messages import NetworkDrop
 from automax_ros.messages.types.topics import NETWORK, Topic
 from automax_ros.rack.modules.module import Module
 from automax_ros.rack.modules.network import CYCLE_NS
-from automax_ros.rack.modules.network_drops import Frame, NetworkStatus, Sender, Station
+from automax_ros.rack.modules.network_drops import DropMessage, NetworkStatus, Sender, Station
 from automax_ros.rackfile.model.ros_names import network_topic
 from automax_ros.rackfile.modules.network import HALF
 from automax_ros.rackfile.reading.names import is_rack_name
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
 from automax_ros.ros.intake.raw_messages import taker_of
@@ -45,7 +45,7 @@ MOST_BYTES = len(encode(NetworkDrop(0, 0, "R" * 8, 0, 0, 0, False, 0, 0, (0,) * 
 class NetworkNode(ModuleNode):
     """Serves one network module."""
 
-    def __init__(self, site: Site, module: Module) -> None:
+    def __init__(self, site: RackContext, module: Module) -> None:
         """Join the network."""
         super().__init__(site, module.config.name)
         assert isinstance(module, Station)
@@ -61,7 +61,7 @@ class NetworkNode(ModuleNode):
         scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._look())
         self.diagnose(self._health)
 
-    def _send(self, now_ns: int, frames: Sequence[Frame]) -> None:
+    def _send(self, now_ns: int, frames: Sequence[DropMessage]) -> None:
         stream, rack = self.site.stream, self.site.rack.config.name
         stamp = stream.stamp(now_ns)
         for item in frames:
@@ -148,7 +148,7 @@ class _Cable:
         return int(rcl.on_message(pointer, callback, data))
 
 
-def _read(payload: bytes) -> tuple[Sender, Frame] | None:
+def _read(payload: bytes) -> tuple[Sender, DropMessage] | None:
     """Return what a message says, None where it says nothing."""
     try:
         found = decode(TYPE, payload)
@@ -157,7 +157,7 @@ def _read(payload: bytes) -> tuple[Sender, Frame] | None:
     assert isinstance(found, NetworkDrop)
     rack = found.rack if is_rack_name(found.rack) else ""
     words = tuple(found.registers)
-    frame = Frame(found.station, found.depth, found.defined, found.drop, found.sequence, words)
+    frame = DropMessage(found.station, found.depth, found.defined, found.drop, found.sequence, words)
     return Sender(found.run_id, found.slot, rack), frame
 
 

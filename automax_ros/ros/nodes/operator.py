@@ -43,11 +43,11 @@ from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operator.faults import DriveTrips, displays_of
 from automax_ros.rack.operator.halting import Halting
-from automax_ros.rack.operator.requests import Orders, Reading
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.rack.operator.requests import OperatorRequests, Reading
+from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.clients.recorded_run import ALONE_NS, racks_of
-from automax_ros.ros.distributed.forwarding import Forwarding
-from automax_ros.ros.intake.service_requests import Later, allow_later
+from automax_ros.ros.distributed.forwarding import RequestForwarder
+from automax_ros.ros.intake.service_requests import DeferredResponse, allow_deferred
 from automax_ros.ros.nodes.reloading import Reloading
 from automax_ros.ros.nodes.tables import status_of_task, task_fields
 from automax_ros.runtime.tasks.task import Status
@@ -66,7 +66,7 @@ def _nothing(_: Any, __: Any) -> None:
     """Tell nothing further."""
 
 
-class OperatorDesk:
+class OperatorServices:
     """Serves requests by the services of one node. ``close`` when it leaves the graph.
 
     ``forward_by``, once it is set, passes on what concerns other processes of a distributed rack.
@@ -76,8 +76,8 @@ class OperatorDesk:
         """Create the services; ``name_of`` returns the full name of one."""
         self._node, self._site, self._rack = node, node.site, node.site.rack
         self._name_of = name_of
-        self.forward_by: Forwarding | None = None
-        orders = self._orders = Orders(self._rack)
+        self.forward_by: RequestForwarder | None = None
+        orders = self._orders = OperatorRequests(self._rack)
         self._halting = Halting(self._rack, self._site.pacer)
         self._trips = DriveTrips(self._rack)
         self._begun_ns = time.monotonic_ns()
@@ -116,16 +116,16 @@ class OperatorDesk:
             done("" if response.success else response.message or "refused")
 
         answer = self._run_all(Trigger.Request(), Trigger.Response())
-        if isinstance(answer, Later):
+        if isinstance(answer, DeferredResponse):
             answer.begin(respond)
         else:
             respond(answer)
 
     def _serve(self, kind: Any, name: str, act: Act, tell: Tell = _nothing) -> Callable[[Any, Any], Any]:
-        """Create a service, and return what answers it: a response, or ``Later``."""
+        """Create a service, and return what answers it: a response, or ``DeferredResponse``."""
 
         def answered(request: Any, response: Any) -> Any:
-            with self._site.present():
+            with self._site.between_scans():
                 error: Exception | None = None
                 try:
                     act(request, response)
@@ -139,10 +139,10 @@ class OperatorDesk:
         def routed(request: Any, response: Any) -> Any:
             if self.forward_by is None:
                 return answered(request, response)
-            with self._site.present():
+            with self._site.between_scans():
                 return self.forward_by.answer(name, kind, request, response, answered)
 
-        allow_later(self._node.create_service(kind, self._name_of(name), routed))
+        allow_deferred(self._node.create_service(kind, self._name_of(name), routed))
         return routed
 
     def _concluded(self, name: str, request: Any, response: Any, error: Exception | None, tell: Tell) -> Any:
@@ -290,10 +290,10 @@ def _fill(response: Any, values: list[Reading]) -> None:
 class OperatorNode(ModuleNode):
     """Serves the operator of one rack."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: RackContext) -> None:
         """Create the services."""
         super().__init__(site, "operator")
-        self.desk = OperatorDesk(self)
+        self.desk = OperatorServices(self)
 
     def destroy_node(self) -> None:
         """Leave the graph; a source that is being compiled is not installed."""

@@ -29,7 +29,7 @@ from automax_ros.rack.operator.faults import displays_of
 from automax_ros.rackfile.modules.udc import ISCR, SCAN_COUNTER, SCANS_PER_INTERRUPT
 from automax_ros.ros.base.diagnostics import worst
 from automax_ros.ros.base.module_lifecycle import ManagedModuleNode
-from automax_ros.ros.base.node import Site
+from automax_ros.ros.base.node import RackContext
 from automax_ros.ros.intake.guard import Throttle
 from automax_ros.ros.nodes.tunables import TunableParameters
 from automax_ros.runtime.memory.views import WriteGroup
@@ -45,7 +45,7 @@ ERRORS_SHOWN = 5
 class ProcessorNode(ManagedModuleNode):
     """Serves one Processor; the scheduler of the rack scans its tasks."""
 
-    def __init__(self, site: Site, processor: Module) -> None:
+    def __init__(self, site: RackContext, processor: Module) -> None:
         """Create publishers and parameters, and observe the rack."""
         super().__init__(site, processor)
         rack, stream = site.rack, site.stream
@@ -56,7 +56,7 @@ class ProcessorNode(ManagedModuleNode):
             for topic in stream.module_topics
             if topic.slot == self._slot
         }
-        self.tunables = TunableParameters(self, rack, site.present)
+        self.tunables = TunableParameters(self, rack, site.between_scans)
         self.tunables.declare(self._tasks)
         self._stop_throttle = Throttle(ERROR_INTERVAL_S)
         self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in self._tasks}
@@ -172,7 +172,7 @@ _SHOWN = {"iscr": ISCR, "scans_per_interrupt": SCANS_PER_INTERRUPT, "scans_since
 class UdcNode(ProcessorNode):
     """Serves one UDC."""
 
-    def __init__(self, site: Site, udc: Module) -> None:
+    def __init__(self, site: RackContext, udc: Module) -> None:
         """Create publishers and parameters, and observe the rack."""
         self._udc = udc
         super().__init__(site, udc)

@@ -25,16 +25,24 @@ from rclpy.context import Context
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
-from automax_ros.ros.base.lifecycle import ACTIVATE, ACTIVE, DEACTIVATE, Duties, Managed, Pending, TransitionRefused
+from automax_ros.ros.base.lifecycle import (
+    ACTIVATE,
+    ACTIVE,
+    DEACTIVATE,
+    LifecycleCallbacks,
+    LifecycleNode,
+    Pending,
+    TransitionRefused,
+)
 from automax_ros.ros.base.module_lifecycle import NOT_OPERATED
-from automax_ros.ros.base.node import MAIN_NODE, GuardedNode
+from automax_ros.ros.base.node import MAIN_NODE, RackRosNode
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.runtime.health import Health
 from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Task
 
 
-class Held(Protocol):
+class RunningRack(Protocol):
     """A rack with its nodes."""
 
     rack: Rack
@@ -53,10 +61,10 @@ class Held(Protocol):
         ...
 
 
-class HeldRack:
+class RackLifecycle:
     """RUN and STOP ALL of a started rack; its program alone starts, closes and exchanges it (decision)."""
 
-    def __init__(self, held: Held) -> None:
+    def __init__(self, held: RunningRack) -> None:
         self._held = held
 
     def refusal(self, transition: str) -> str | None:
@@ -100,7 +108,7 @@ _RUNS = ("run", "run_all")
 """The operations that put tasks into RUN."""
 
 
-class RackNode(Managed, GuardedNode):
+class RackNode(LifecycleNode, RackRosNode):
     """The node of a whole rack."""
 
     def __init__(
@@ -108,12 +116,12 @@ class RackNode(Managed, GuardedNode):
         namespace: str,
         context: Context,
         health: Health,
-        duties: Duties,
+        duties: LifecycleCallbacks,
         enter: Callable[[Callable[[], None]], None],
         arguments: RosArguments = NO_ARGUMENTS,
     ) -> None:
-        """Join the graph, unconfigured; the arguments are those of ``GuardedNode`` and ``Managed.manage``."""
-        GuardedNode.__init__(self, MAIN_NODE, namespace, context, health, arguments)
+        """Join the graph, unconfigured; the arguments are those of ``RackRosNode`` and ``LifecycleNode.manage``."""
+        RackRosNode.__init__(self, MAIN_NODE, namespace, context, health, arguments)
         self.health = health
         self.manage(duties, self.guard, enter)
 
@@ -121,7 +129,7 @@ class RackNode(Managed, GuardedNode):
 class Follower:
     """Observes a rack, so that the node ``rack`` is active where somebody else has put tasks into RUN."""
 
-    def __init__(self, manager: Managed) -> None:
+    def __init__(self, manager: LifecycleNode) -> None:
         self._manager = manager
 
     def operated(self, operation: Operation) -> None:

@@ -21,7 +21,7 @@ from automax_ros.rackfile.modules.network import NETWORK
 from automax_ros.rackfile.modules.processor import PC3000, PROCESSOR
 from automax_ros.rackfile.modules.registry import SUPPORTED
 from automax_ros.rackfile.modules.udc import UDC
-from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.rack_health import RackHealth
 from automax_ros.ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.ros.nodes.drive_plant import DrivePlantNode
@@ -29,7 +29,7 @@ from automax_ros.ros.nodes.io_module import IoModuleNode
 from automax_ros.ros.nodes.network import NetworkNode
 from automax_ros.ros.nodes.operator import OperatorNode
 from automax_ros.ros.nodes.processor import ProcessorNode, UdcNode
-from automax_ros.ros.nodes.tables import Tables
+from automax_ros.ros.nodes.tables import StatusTables
 
 Facts = dict[str, tuple[bool | int | float | str, str]]
 """Value and description by name."""
@@ -63,7 +63,7 @@ def module_facts(module: ModuleConfig) -> Facts:
     return facts
 
 
-NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
+NODES: dict[ModuleKind, Callable[[RackContext, Module], ModuleNode] | None] = {
     PROCESSOR: ProcessorNode,
     PC3000: ProcessorNode,
     COMMON_MEMORY: None,
@@ -79,7 +79,7 @@ NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
 """The node of each kind of module; None where the rack's common memory node is enough."""
 
 
-def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
+def nodes_of(site: RackContext) -> tuple[ModuleNode, ...]:
     """Create the nodes of a rack's part: those of its modules by slot.
 
     Where common memory is, its node and, if the rack has one, the operator's stand first.
@@ -87,7 +87,7 @@ def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
     After the modules stand those of the plants that drives turn, by slot and drive.
     """
     made: list[ModuleNode] = []
-    if site.is_home:
+    if site.holds_common_memory:
         made.append(CommonMemoryNode(site))
         made[0].declare_facts(rack_facts(site.rack))
         if site.rack.config.operator:
@@ -98,7 +98,7 @@ def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
             made.append(node(site, module))
             made[-1].declare_facts(module_facts(module.config))
     made += (DrivePlantNode(site, driven) for driven in site.rack.part.driven)
-    if not site.is_home:
+    if not site.holds_common_memory:
         made[0].diagnose(RackHealth(site, f"{made[0].get_name()}: process").statuses)
-    Tables(made[0])
+    StatusTables(made[0])
     return tuple(made)

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from automax_ros.rack.operator.requests import Orders, ReloadRefused
-from automax_ros.rack.tasks.installation import Prepared
+from automax_ros.rack.operator.requests import OperatorRequests, ReloadRefused
+from automax_ros.rack.tasks.installation import PreparedReload
 from automax_ros.ros.base.module_lifecycle import Background
 from automax_ros.ros.base.node import ModuleNode
-from automax_ros.ros.intake.service_requests import Later, Respond
+from automax_ros.ros.intake.service_requests import DeferredResponse, Respond
 
 Conclude = Callable[[Any, Any, Exception | None], Any]
 """Returns a response to a request, with how it ended and what is true now; called between two scans."""
@@ -22,7 +22,7 @@ Conclude = Callable[[Any, Any, Exception | None], Any]
 class Reloading:
     """Carries out the reloads that are asked of one node; ``close`` when it leaves the graph."""
 
-    def __init__(self, node: ModuleNode, orders: Orders, conclude: Conclude) -> None:
+    def __init__(self, node: ModuleNode, orders: OperatorRequests, conclude: Conclude) -> None:
         """Begin with none."""
         self._site, self._orders, self._conclude = node.site, orders, conclude
         self._work = Background(node)
@@ -30,7 +30,7 @@ class Reloading:
 
     def answer(self, request: Any, response: Any) -> Any:
         """Answer a request: at once where it is refused, else when its source is compiled."""
-        with self._site.present():
+        with self._site.between_scans():
             try:
                 self._refuse_second(request.task)
                 name, source = self._orders.admit_reload(request.task, request.source)
@@ -43,8 +43,8 @@ class Reloading:
                 lambda: self._orders.prepare(name, source), lambda found, error: finish(found, error, respond)
             )
 
-        def finish(prepared: Prepared, error: Exception | None, respond: Respond) -> None:
-            with self._site.present():
+        def finish(prepared: PreparedReload, error: Exception | None, respond: Respond) -> None:
+            with self._site.between_scans():
                 try:
                     if error is not None:
                         raise error
@@ -58,7 +58,7 @@ class Reloading:
                 self._reloading = ""
                 respond(self._conclude(request, response, error))
 
-        return Later(begin)
+        return DeferredResponse(begin)
 
     def close(self) -> None:
         """End; a source that is being compiled is not installed."""

@@ -33,7 +33,7 @@ from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.reading.executive import most_forces
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import ros_qos
-from automax_ros.ros.distributed.bus_topics import BusWay, Terms
+from automax_ros.ros.distributed.bus_topics import BusTopic, Terms
 from automax_ros.runtime.health import FROM_STRANGERS
 from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Task
@@ -61,7 +61,7 @@ class JoinedTasks:
             if module.slot not in rack.part.slots
         }
         self._heard: dict[str, tuple[int, list[RemoteTask]]] = {}
-        BusWay(node, PARTS, NAMES[RemoteTable], ros_qos(PART), self._take, self._refuse, Terms(MOST_BYTES))
+        BusTopic(node, PARTS, NAMES[RemoteTable], ros_qos(PART), self._take, self._refuse, Terms(MOST_BYTES))
 
     def tasks(self, now_ns: int) -> Sequence[RemoteTask]:
         """Return the tasks of all modules that were heard of lately."""
@@ -95,18 +95,20 @@ _UNCOUNTED = frozenset({"scans", "skipped"})
 """Fields whose change alone is not a reason to send a table of tasks."""
 
 
-class Tables:
+class StatusTables:
     """Sends the tables of what is in this process, by the publishers of one node."""
 
     def __init__(self, node: ModuleNode) -> None:
         """Create the publishers; the first tables go out with the rack's start."""
         self._rack, self._stream, self._pace = node.site.rack, node.site.stream, node.site.pacer
         part = self._rack.part
-        self._tasks = node.create_publisher(TaskTable, "tasks" if part.is_home else PARTS, ros_qos(LATCHED))
-        self._joined = JoinedTasks(node, self._soon) if part.is_home and not part.is_whole else None
+        self._tasks = node.create_publisher(TaskTable, "tasks" if part.holds_common_memory else PARTS, ros_qos(LATCHED))
+        self._joined = JoinedTasks(node, self._soon) if part.holds_common_memory and not part.is_whole else None
         self._statistics = node.create_publisher(ScanStatistics, "statistics", STATISTICS_DEPTH)
         self._forces = (
-            node.create_publisher(ForceTable, "forces", ros_qos(LATCHED)) if self._rack.part.is_home else None
+            node.create_publisher(ForceTable, "forces", ros_qos(LATCHED))
+            if self._rack.part.holds_common_memory
+            else None
         )
         self._sent: dict[type, Any] = {}
         self._reported_ns = self._next_look_ns = self._rack.now_ns
@@ -160,7 +162,7 @@ class Tables:
             self._forces.publish(ForceTable(**self._head(now_ns), most=most, forces=lines))
 
     def _report(self, now_ns: int) -> None:
-        if not self._rack.part.is_home:
+        if not self._rack.part.holds_common_memory:
             self._sent.clear()  # so the home knows that this process lives
         self.look(now_ns)
         passed_ns, self._reported_ns = now_ns - self._reported_ns, now_ns

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.processes import Seat
-from automax_ros.ros.distributed.bus import Seating
+from automax_ros.rackfile.processes import RackProcess
+from automax_ros.ros.distributed.bus import ProcessLayout
 from automax_ros.ros.rack_nodes import RackNodes
 from automax_ros.ros.security.profiles import LOG, Enclave, Profile
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
@@ -32,21 +32,21 @@ def enclave_of_rack(config: RackConfig, arguments: RosArguments = NO_ARGUMENTS) 
 
 
 def enclaves_of_seats(
-    config: RackConfig, seats: Sequence[Seat], arguments: RosArguments = NO_ARGUMENTS
+    config: RackConfig, seats: Sequence[RackProcess], arguments: RosArguments = NO_ARGUMENTS
 ) -> tuple[Enclave, ...]:
     """Return the enclaves of the processes of a distributed rack.
 
     Raises:
         RackError, RosUnavailable: as above.
     """
-    seating = Seating([seat.slots for seat in seats], _ANY_RUN)
+    seating = ProcessLayout([seat.slots for seat in seats], _ANY_RUN)
     return tuple(
         Enclave(f"/{config.namespace}/{seat.name}", _profiles(Rack(config, local=seat.slots), arguments, seating))
         for seat in seats
     )
 
 
-def _profiles(rack: Rack, arguments: RosArguments, seating: Seating | None = None) -> tuple[Profile, ...]:
+def _profiles(rack: Rack, arguments: RosArguments, seating: ProcessLayout | None = None) -> tuple[Profile, ...]:
     context = joined_context(arguments)
     try:
         with RackNodes(rack, context=context, arguments=arguments, seating=seating) as made:

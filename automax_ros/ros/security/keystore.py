@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.ros.security.policy import Validity, governance_text, permissions_text
 from automax_ros.ros.security.profiles import Enclave
 
@@ -25,7 +25,7 @@ _PATIENCE_S = 60.0
 _ROLES = ("identity", "permissions")
 
 
-class KeystoreError(Fault):
+class KeystoreError(UserError):
     """A keystore cannot be written, or openssl fails."""
 
 

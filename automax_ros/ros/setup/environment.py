@@ -25,20 +25,20 @@ import sysconfig
 import tempfile
 from pathlib import Path
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.messages.types.definitions import message_types
 from automax_ros.ros.setup.discovery import announce_soon, choose_range
 
 SETUP_COMMAND = "make setup"
 COLCON_COMMAND = "colcon build --base-paths src src/automax_ros/msg_defs"
-"""In a workspace as README.md lays it out: without the second path colcon does not see msg_defs/."""
+"""In a workspace as docs/howto/workspace.md lays it out: without the second path colcon does not see msg_defs/."""
 
 
 # Set for the process that prepare() starts in place of this one: a second restart could not do better.
 _RESTARTED = "AUTOMAX_ROS_RESTARTED"
 
 
-class RosUnavailable(Fault):
+class RosUnavailable(UserError):
     """ROS 2, its middleware or automax_msgs cannot be used here; the text names the command that helps."""
 
 

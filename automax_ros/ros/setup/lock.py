@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.ros.setup.environment import RosUnavailable
 
@@ -17,7 +17,7 @@ MAX_DOMAIN = 232
 """Beyond it the ports of DDS end."""
 
 
-class LockError(Fault):
+class LockError(UserError):
     """The lock cannot be taken."""
 
 
@@ -37,7 +37,7 @@ def domain_id() -> int:
     return int(text)
 
 
-class RackLock:
+class InstanceLock:
     """Holds the lock while the ``with`` block lasts; the kernel frees it when the process ends, however it ends.
 
     A process with the whole rack holds the rack alone. One with a ``seat`` of a rack that is distributed shares the
@@ -51,7 +51,7 @@ class RackLock:
         self._path = Path(tempfile.gettempdir()) / f"{name}.lock"
         self._files: list[tuple[int, Path]] = []
 
-    def __enter__(self) -> RackLock:
+    def __enter__(self) -> InstanceLock:
         """Take the lock.
 
         Raises:

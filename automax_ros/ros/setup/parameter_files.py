@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence, read_yaml
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
@@ -37,7 +37,7 @@ _OCTAL = re.compile(r"[-+]?0[0-7]+")
 _REAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 
-class RosArgumentsError(Fault):
+class RosArgumentsError(UserError):
     """What stands after ``--ros-args``, a file that it names, or ROS_NAMESPACE cannot be used."""
 
 

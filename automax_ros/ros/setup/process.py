@@ -22,7 +22,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from automax_ros.ros.intake.guard import Guard
+from automax_ros.ros.intake.guard import RequestGuard
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.environment import RosUnavailable
 
@@ -144,11 +144,11 @@ class RosProcess:
         """
         self.context = joined_context(arguments)
         self.executor = make_executor(self.context)
-        self._guard: Guard | None = None
+        self._guard: RequestGuard | None = None
         self._thread: threading.Thread | None = None
         self._rests = False
 
-    def spin(self, guard: Guard) -> None:
+    def spin(self, guard: RequestGuard) -> None:
         """Begin to serve the nodes; ``guard`` is told what fails."""
         self._guard, self._rests = guard, False
         self._thread = threading.Thread(target=self._spin, name="executor", daemon=True)

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from automax_ros.runtime.scan.scan_record import ScanRecord, Steps
 
-__all__ = ["IDEAL", "Execution", "Ideal", "Job", "Place", "ScanRecord", "Steps"]
+__all__ = ["IDEAL", "Execution", "IdealExecution", "Job", "Place", "ScanRecord", "Steps"]
 
 Place = Mapping[str, Any]
 """How far a job is that is under way, in numbers: ``left_ns`` before its next step, what it ``skipped``."""
@@ -63,7 +63,7 @@ class Execution(Protocol):
         ...
 
 
-class Ideal:
+class IdealExecution:
     """A scan takes no time."""
 
     def begin(self, job: Job, now_ns: int, skipped: int) -> None:
@@ -90,4 +90,4 @@ class Ideal:
         raise ValueError(f"task {job.name} was in the middle of a scan: the state is that of modeled execution")
 
 
-IDEAL = Ideal()
+IDEAL = IdealExecution()

@@ -20,7 +20,7 @@ class _Frame:
     dropped: bool = False
 
 
-class ProcessorTime:
+class ModeledExecution:
     """Executes jobs one at a time: the highest priority first, equals in alphabetical order.
 
     A job of higher priority suspends a lower one, which goes on after it (PC3000 manual p. 15-2). Equals do not suspend

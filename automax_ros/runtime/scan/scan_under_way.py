@@ -24,7 +24,7 @@ Progress = Mapping[str, Any]
 """How far a scan is, in numbers, texts, lists and mappings."""
 
 
-class HeardMemory:
+class ReplayableReads:
     """Memory as a scan under way uses it: ``heard`` is all that it was given since it began.
 
     After ``tell`` it gives what an earlier scan was given and writes nothing, until ``live``. ``latched`` are the views
@@ -115,7 +115,7 @@ class HeardMemory:
 
 
 @dataclass(eq=False)
-class ScanUnderWay:
+class ScanInProgress:
     """A scan that has begun: ``steps`` counts those it has announced.
 
     ``log`` is the error log before it, ``own_errors`` what it has logged itself; None where there is nothing.
@@ -125,7 +125,7 @@ class ScanUnderWay:
     skipped: int
     state: StateValues
     log: ErrorLog | None
-    memory: HeardMemory
+    memory: ReplayableReads
     steps: int = 0
     own_errors: ErrorLog | None = None
 
@@ -141,11 +141,11 @@ class ScanUnderWay:
         }
 
 
-Begun = tuple[ScanUnderWay, ScanRecord | None, Generator[int, None, bool]]
+Begun = tuple[ScanInProgress, ScanRecord | None, Generator[int, None, bool]]
 """A scan that has begun: what it works on, its record if one is kept, and the compiled form that executes it."""
 
 
-def add_error(entry: LogEntry, log: ErrorLog, scan: ScanUnderWay | None) -> None:
+def add_error(entry: LogEntry, log: ErrorLog, scan: ScanInProgress | None) -> None:
     """Log an error, as that of a scan under way if there is one."""
     log.add(entry)
     if scan is not None:
@@ -154,7 +154,7 @@ def add_error(entry: LogEntry, log: ErrorLog, scan: ScanUnderWay | None) -> None
         scan.own_errors.add(entry)
 
 
-def cleared_errors(log: ErrorLog, scan: ScanUnderWay | None, *, inside: bool) -> ErrorLog:
+def cleared_errors(log: ErrorLog, scan: ScanInProgress | None, *, inside: bool) -> ErrorLog:
     """Return what is left of a log that is cleared, from ``inside`` the scan under way or by the operator.
 
     After the operator's clearing there is still what a scan under way logs itself (decision).

@@ -33,7 +33,7 @@ class LoneVariable:
     write: Callable[[Value], None]
 
 
-class LoneTask:
+class StandaloneTask:
     """A task in a rack of its own, where everybody may read and set all its variables between scans."""
 
     def __init__(self, program: Program, native: NativeForms = IN_PYTHON) -> None:

@@ -21,9 +21,9 @@ from automax_ros.runtime.scan.modeled_scan import scan_in_steps
 from automax_ros.runtime.scan.scan_record import ScanRecord, Status, Steps
 from automax_ros.runtime.scan.scan_under_way import (
     Begun,
-    HeardMemory,
     Progress,
-    ScanUnderWay,
+    ReplayableReads,
+    ScanInProgress,
     add_error,
     cleared_errors,
 )
@@ -67,8 +67,8 @@ class Task:
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
         self._recording = False
         self._scans: Generator[bool, None, None] | None = None
-        self._heard = HeardMemory(memory)
-        self._under_way: ScanUnderWay | None = None
+        self._heard = ReplayableReads(memory)
+        self._under_way: ScanInProgress | None = None
         self.install(compiled)
         memory.watch_forces(self._look_at_forces)
 
@@ -195,7 +195,7 @@ class Task:
         self.heed_forces()
         self._put_down()
         self._heard.begin()
-        self._under_way = scan = ScanUnderWay(now_ns, skipped, self._state[:], None, self._heard)
+        self._under_way = scan = ScanInProgress(now_ns, skipped, self._state[:], None, self._heard)
         if self._arrays:
             self._copy_arrays(scan.state)
         if self.errors.count:

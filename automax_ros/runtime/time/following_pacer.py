@@ -59,7 +59,7 @@ class FollowingPacer:
         """The scheduler's time: that of the clock, less where it began."""
         return self._scheduler.now_ns
 
-    def begin(self, lead_ns: int = 0) -> int:  # noqa: ARG002
+    def begin(self, start_delay_ns: int = 0) -> int:  # noqa: ARG002
         """Let the scheduler's present be the last time that was heard, which is returned."""
         heard = self._heard_ns or 0
         self._zero_ns, self._opens = heard - self._scheduler.now_ns, True

@@ -41,8 +41,8 @@ class Pace(Protocol):
     def now_ns(self) -> int:
         """The time that the scheduler should have, ns; negative before it begins."""
 
-    def begin(self, lead_ns: int = 0) -> int:
-        """Let the scheduler's present be now, or ``lead_ns`` from now; return the stamp (ns) that it has."""
+    def begin(self, start_delay_ns: int = 0) -> int:
+        """Let the scheduler's present be now, or ``start_delay_ns`` from now; return the stamp (ns) that it has."""
 
     def catch_up(self) -> None:
         """Bring the scheduler's time to the present, before something comes from outside."""
@@ -125,12 +125,12 @@ class Pacer:
         self.halted = False
         self.while_halted: Callable[[], object] = _nothing
 
-    def begin(self, lead_ns: int = 0) -> int:
-        """Let the scheduler's present be ``lead_ns`` from now on the wall clock; return the time of day then, ns."""
-        self._zero_ns = self._clock() + lead_ns - self._scheduler.now_ns
+    def begin(self, start_delay_ns: int = 0) -> int:
+        """Let the scheduler's present be ``start_delay_ns`` from now on the wall clock; return that time of day, ns."""
+        self._zero_ns = self._clock() + start_delay_ns - self._scheduler.now_ns
         if not self.halted:
             self._scheduler.zero_ns = self._zero_ns
-        return time.time_ns() + lead_ns
+        return time.time_ns() + start_delay_ns
 
     def halt(self) -> None:
         """Let time stand still from now on; ``while_halted`` is called every now and then, 20 times per second."""

@@ -65,7 +65,7 @@ class SimulatedPacer:
         """The scheduler's time: nothing else keeps it."""
         return self._scheduler.now_ns
 
-    def begin(self, lead_ns: int = 0) -> int:  # noqa: ARG002
+    def begin(self, start_delay_ns: int = 0) -> int:  # noqa: ARG002
         """Let time pass from now on; stamps are rack time, so that of the present is 0 at the start."""
         self._zero_ns = None
         return self._scheduler.now_ns

@@ -14,7 +14,7 @@ import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.types import Value
 from automax_ros.rack.base.stop_cause import StopCause
@@ -91,7 +91,7 @@ class Stepper:
         if line not in found:
             after = min((other for other in found if other > line), default=None)
             hint = f"the next line with a statement is {after}" if after is not None else None
-            raise Fault(f"line {line} of task {item.name} holds no statement of its scan", hint)
+            raise UserError(f"line {line} of task {item.name} holds no statement of its scan", hint)
         if (item.name, line) not in self.lines:
             self.lines.append((item.name, line))
         self._hold()
@@ -116,7 +116,7 @@ class Stepper:
         lines = [item for item in self.lines if plain in ("ALL", f"{item[0]}:{item[1]}")]
         names = [label for label in self.watched if plain in ("ALL", label)]
         if not lines and not names and plain != "ALL":
-            raise Fault(f"there is no breakpoint {quoted(what)}")
+            raise UserError(f"there is no breakpoint {quoted(what)}")
         self.lines = [item for item in self.lines if item not in lines]
         for label in names:
             del self.watched[label]
@@ -233,20 +233,24 @@ class Stepper:
         items = {item.name: item for item in self.rack.scheduled}
         item = items.get(name.strip().upper())
         if item is None:
-            raise Fault(f"the rack has no task {quoted(name)}", f"it has {', '.join(items)}")
+            raise UserError(f"the rack has no task {quoted(name)}", f"it has {', '.join(items)}")
         return item
 
     def _running(self, name: str) -> ScheduledTask:
         item = self._task(name)
         if item.task.status is not Status.RUNNING:
-            raise Fault(f"task {item.name} does not run: {item.task.status.value}", f"put it into RUN: run {item.name}")
+            raise UserError(
+                f"task {item.name} does not run: {item.task.status.value}", f"put it into RUN: run {item.name}"
+            )
         return item
 
     def _steppable(self, name: str) -> ScheduledTask:
         item = self._task(name)
         if not self.by_lines:
             hint = "step it in ideal execution (`automax step --ideal`); breakpoints on variables work in both"
-            raise Fault("scans of modeled execution cannot be held at a line: higher priorities go on meanwhile", hint)
+            raise UserError(
+                "scans of modeled execution cannot be held at a line: higher priorities go on meanwhile", hint
+            )
         return item
 
     def _all_steppable(self) -> list[ScheduledTask]:

@@ -12,7 +12,7 @@ from automax_ros.core.types import Value
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
-from automax_ros.scenario.stimuli.stage import Stage
+from automax_ros.scenario.stimuli.stage import WavePlayer
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class OnTask:
     of: str
     operation: Callable[[str], None]
 
-    def do(self, _: Stage) -> None:
+    def do(self, _: WavePlayer) -> None:
         """Do it."""
         self.operation(self.of)
 
@@ -34,7 +34,7 @@ class OnRack:
     operation: Callable[[], None]
     of: str = ""
 
-    def do(self, _: Stage) -> None:
+    def do(self, _: WavePlayer) -> None:
         """Do it."""
         self.operation()
 
@@ -47,7 +47,7 @@ class OnValue:
     value: Value
     operation: Callable[[str, Any], None]
 
-    def do(self, _: Stage) -> None:
+    def do(self, _: WavePlayer) -> None:
         """Give it."""
         self.operation(self.of, self.value)
 
@@ -61,7 +61,7 @@ class Reload:
     keep_state: bool
     rack: Rack
 
-    def do(self, _: Stage) -> None:
+    def do(self, _: WavePlayer) -> None:
         """Install it; one that has errors leaves the old one running."""
         try:
             self.rack.operations.reload(self.of, self.source, keep_state=self.keep_state)
@@ -78,7 +78,7 @@ class Control:
     value: str
     move: Callable[[str, str, str], None]
 
-    def do(self, _: Stage) -> None:
+    def do(self, _: WavePlayer) -> None:
         """Move it."""
         self.move(self.of, self.control, self.value)
 

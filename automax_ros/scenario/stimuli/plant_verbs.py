@@ -14,17 +14,17 @@ from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.faults import VERBS, PlantVerb, values_of
 from automax_ros.rack.modules.module import Operable
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.reading.values import Entry, Findings, Section, entries_of, integer_value, kind_of
+from automax_ros.rackfile.reading.values import Entry, ProblemList, Section, entries_of, integer_value, kind_of
 from automax_ros.scenario.stimuli.actions import Control
 from automax_ros.scenario.stimuli.reading import Verb, named
 from automax_ros.scenario.stimuli.stage import Action
 
 
-def read_plant_work(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
+def read_plant_work(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
     """Return what is done to plants: ``{UNWIND: {short_scr: 3}}``."""
-    controls = Controls(rack)
+    controls = SwitchOperations(rack)
     found: list[Action] = []
     for key, item in named(node, what, findings):
         name = findings.upper_case(key.text, key.span)
@@ -45,7 +45,7 @@ def read_plant_work(rack: Rack, node: Node, what: str, findings: Findings) -> li
     return found
 
 
-def _text(verb: Scalar, node: Node, where: str, findings: Findings) -> str | None:
+def _text(verb: Scalar, node: Node, where: str, findings: ProblemList) -> str | None:
     """Return the value of a verb as commands and services write it, None where there was something to report."""
     known = VERBS.get(verb.text)
     if known is None:
@@ -72,7 +72,7 @@ def _plain(node: Node) -> str:
     return node.text if isinstance(node, Scalar) and not node.is_null else ""
 
 
-def _joined(verb: PlantVerb, node: Mapping, what: str, findings: Findings) -> str:
+def _joined(verb: PlantVerb, node: Mapping, what: str, findings: ProblemList) -> str:
     """Return the values of a form with keys, one after the other; "" where there was something to report.
 
     A value that is left out before another is the usual one.
@@ -93,8 +93,8 @@ def control_verbs(rack: Rack) -> AbstractMapping[str, Verb]:
     return {"module": Verb(partial(_module, rack)), "plant": Verb(partial(read_plant_work, rack))}
 
 
-def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
-    controls, by_slot = Controls(rack), {module.config.slot: module for module in rack.modules}
+def _module(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
+    controls, by_slot = SwitchOperations(rack), {module.config.slot: module for module in rack.modules}
     found: list[Action] = []
     for key, item in named(node, what, findings):
         plain = Scalar(key.text, True, key.span)  # JSON knows keys in quotes only
@@ -122,7 +122,9 @@ class _Given:
     value: str
 
 
-def _controls(node: Node, what: str, known: AbstractMapping[str, tuple[str, ...]], findings: Findings) -> list[_Given]:
+def _controls(
+    node: Node, what: str, known: AbstractMapping[str, tuple[str, ...]], findings: ProblemList
+) -> list[_Given]:
     entries = entries_of(node, what, findings)
     if entries == ():
         findings.add("AMX6008", f"{what}: no control is named", node.span)
@@ -131,7 +133,7 @@ def _controls(node: Node, what: str, known: AbstractMapping[str, tuple[str, ...]
 
 
 def _control(
-    entry: Entry, what: str, known: AbstractMapping[str, tuple[str, ...]], findings: Findings
+    entry: Entry, what: str, known: AbstractMapping[str, tuple[str, ...]], findings: ProblemList
 ) -> _Given | None:
     key, node = entry
     if key.text not in known:

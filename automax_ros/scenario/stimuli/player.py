@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
-from automax_ros.scenario.stimuli.stage import ENTRIES, Action, Happened, Stage, Stimulus, in_time
+from automax_ros.scenario.stimuli.stage import ENTRIES, Action, OperationRecord, Stimulus, WavePlayer, in_time
 
 _KEY = EventKey(EventClass.OUTSIDE, ENTRIES, "stimuli")
 
 
-class Stimulation:
+class StimuliPlayer:
     """Posts one event at a time: that of the next instant with entries.
 
     ``happened`` are the operations so far, refused ones too, and values that were refused; ``refused`` counts
@@ -23,8 +23,8 @@ class Stimulation:
     def __init__(self, stimuli: Sequence[Stimulus], scheduler: Scheduler) -> None:
         """Take entries in any order; nothing is posted yet."""
         self._waiting = deque(in_time(stimuli))
-        self._stage = Stage(scheduler)
-        self.happened: list[Happened] = []
+        self._stage = WavePlayer(scheduler)
+        self.happened: list[OperationRecord] = []
         self.refused = 0
         self.is_acting = False
         self._everywhere = False
@@ -75,14 +75,14 @@ class Stimulation:
             action.do(self._stage)
         except OperationRefused as refused:
             self.refused += 1
-            self.happened.append(Happened(now_ns, entry.verb, action.of, ok=False, why=str(refused)))
+            self.happened.append(OperationRecord(now_ns, entry.verb, action.of, ok=False, why=str(refused)))
         else:
             if not entry.is_value:
-                self.happened.append(Happened(now_ns, entry.verb, action.of))
+                self.happened.append(OperationRecord(now_ns, entry.verb, action.of))
         finally:
             self.is_acting = self._everywhere = False
 
 
-def _line(item: Happened) -> str:
+def _line(item: OperationRecord) -> str:
     of = f" {item.of}" if item.of else ""
     return f"stimuli: {item.what}{of} was refused: {item.why}"

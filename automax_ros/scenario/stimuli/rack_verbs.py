@@ -20,7 +20,7 @@ from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.reading.files import FileFault, read_task_source, stays_next_to
 from automax_ros.rackfile.reading.values import (
-    Findings,
+    ProblemList,
     Section,
     boolean_value,
     entries_of,
@@ -66,7 +66,7 @@ def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> Mappin
 def _switch(operation: Callable[[], None]) -> Read:
     """Return the reader of a verb that takes ``true`` and nothing else."""
 
-    def read(node: Node, what: str, findings: Findings) -> list[Action]:
+    def read(node: Node, what: str, findings: ProblemList) -> list[Action]:
         if boolean_value(node, what, findings) is False:
             findings.add("AMX6736", f"{what} must be true: leave the entry out if it must not happen", node.span)
         return [OnRack(operation)]
@@ -74,7 +74,7 @@ def _switch(operation: Callable[[], None]) -> Read:
     return read
 
 
-def names_of(node: Node, what: str, findings: Findings) -> list[Scalar]:
+def names_of(node: Node, what: str, findings: ProblemList) -> list[Scalar]:
     """Return the names of a list; one name needs no list."""
     items = node.items if isinstance(node, Sequence) else (node,)
     found = [item for item in items if isinstance(item, Scalar) and not item.is_null]
@@ -90,7 +90,7 @@ def names_of(node: Node, what: str, findings: Findings) -> list[Scalar]:
 class _Tasks:
     rack: Rack
 
-    def task(self, key: Scalar, findings: Findings) -> Task | None:
+    def task(self, key: Scalar, findings: ProblemList) -> Task | None:
         """Return a task, None for one in another process of a distributed rack, which sees to it (decision)."""
         name = findings.upper_case(key.text, key.span)
         known = {task.name: task for task in self.rack.tasks}
@@ -102,7 +102,7 @@ class _Tasks:
     def each(self, operation: Callable[[str], None], every: Callable[[], None] | None = None) -> Read:
         """Return the reader of a verb on tasks; with ``every`` the word all means the whole rack."""
 
-        def read(node: Node, what: str, findings: Findings) -> list[Action]:
+        def read(node: Node, what: str, findings: ProblemList) -> list[Action]:
             if every is not None and isinstance(node, Scalar) and node.text == ALL:
                 return [OnRack(every)]
             tasks = [self.task(name, findings) for name in names_of(node, what, findings)]
@@ -110,12 +110,12 @@ class _Tasks:
 
         return read
 
-    def tune(self, node: Node, what: str, findings: Findings) -> list[Action]:
+    def tune(self, node: Node, what: str, findings: ProblemList) -> list[Action]:
         """Read names TASK.NAME with values."""
         found = (self._tuned(key, value, findings) for key, value in named(node, what, findings))
         return [item for item in found if item is not None]
 
-    def _tuned(self, key: Scalar, node: Node, findings: Findings) -> OnValue | None:
+    def _tuned(self, key: Scalar, node: Node, findings: ProblemList) -> OnValue | None:
         owner, dot, name = key.text.partition(".")
         if not dot:
             hint = "write TASK.NAME, such as SPEED.KP"
@@ -124,7 +124,7 @@ class _Tasks:
         task = self.task(Scalar(owner.strip(), key.plain, key.span), findings)
         return self._of_task(task, name, key, node, findings) if task is not None else None
 
-    def _of_task(self, task: Task, name: str, key: Scalar, node: Node, findings: Findings) -> OnValue | None:
+    def _of_task(self, task: Task, name: str, key: Scalar, node: Node, findings: ProblemList) -> OnValue | None:
         tunables = {item.name: item for item in task.compiled.program.symbols.values() if item.tuning is not None}
         try:
             symbol = element(name, tunables, f"task {task.name} has no tunable").variable
@@ -144,7 +144,7 @@ class _Tasks:
         return OnValue(f"{task.name}.{symbol.name}", value, self.rack.adjust.tune)
 
 
-def _forceable(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
+def _forceable(rack: Rack, key: Scalar, findings: ProblemList) -> Signal | None:
     """Return a variable that may be forced: a simple one that is not a STRING."""
     if "." in key.text:
         return _local(rack, key, findings)
@@ -152,7 +152,7 @@ def _forceable(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
     return None if meant is None else RackSignals(rack).signal(meant)
 
 
-def _local(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
+def _local(rack: Rack, key: Scalar, findings: ProblemList) -> Signal | None:
     if rack.part.is_elsewhere(key.text.partition(".")[0].strip().upper()):
         return None
     try:
@@ -166,7 +166,7 @@ def _local(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
     return local_signal(rack, meant)
 
 
-def _common(rack: Rack, key: Scalar, findings: Findings) -> CommonElement | None:
+def _common(rack: Rack, key: Scalar, findings: ProblemList) -> CommonElement | None:
     try:
         meant = common_named(rack.config, key.text)
     except NameFault as fault:
@@ -182,7 +182,7 @@ def _common(rack: Rack, key: Scalar, findings: Findings) -> CommonElement | None
     return meant
 
 
-def _force(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
+def _force(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
     found: list[Action] = []
     for key, item in named(node, what, findings):
         meant = _forceable(rack, key, findings)
@@ -192,7 +192,7 @@ def _force(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action
     return found
 
 
-def _unforce(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
+def _unforce(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
     if isinstance(node, Scalar) and node.text == ALL:
         return [OnRack(rack.adjust.unforce)]
     variables = [_forceable(rack, name, findings) for name in names_of(node, what, findings)]
@@ -209,7 +209,7 @@ class _Sources:
     stimuli_file: Path
     allow_outside: bool
 
-    def reload(self, node: Node, what: str, findings: Findings) -> list[Action]:
+    def reload(self, node: Node, what: str, findings: ProblemList) -> list[Action]:
         """Read tasks with a file, or with ``file`` and ``keep_state``."""
         tasks = _Tasks(self.rack)
         found: list[Action] = []
@@ -221,7 +221,7 @@ class _Sources:
                 found.append(Reload(task.name, source, keep_state, self.rack))
         return found
 
-    def _file_and_state(self, node: Node, what: str, key: Scalar, findings: Findings) -> tuple[Scalar | None, bool]:
+    def _file_and_state(self, node: Node, what: str, key: Scalar, findings: ProblemList) -> tuple[Scalar | None, bool]:
         if not isinstance(node, Keys):
             return _file(node, what, findings), False
         section = Section(node.entries, what, ("file", "keep_state"), findings)
@@ -230,7 +230,7 @@ class _Sources:
         keeps = boolean_value(keep, f"keep_state of {what}", findings) if keep is not None else False
         return _file(file, f"file of {what}", findings) if file is not None else None, bool(keeps)
 
-    def _source(self, node: Scalar, task: Task, findings: Findings) -> SourceText | None:
+    def _source(self, node: Scalar, task: Task, findings: ProblemList) -> SourceText | None:
         """Return a source, read now: what is in the file later makes no difference (decision)."""
         text, suffix = node.text, Path(self.rack.sources[task.name].name).suffix.upper()
         if Path(text).suffix.upper() != suffix:
@@ -253,12 +253,12 @@ class _Sources:
             return None
 
 
-def _file(node: Node, what: str, findings: Findings) -> Scalar | None:
+def _file(node: Node, what: str, findings: ProblemList) -> Scalar | None:
     is_text = text_value(node, what, findings, limit=_PATH_LIMIT) is not None
     return node if is_text and isinstance(node, Scalar) else None
 
 
-def _power(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
+def _power(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
     entries = entries_of(node, what, findings)
     if entries is None:
         return []

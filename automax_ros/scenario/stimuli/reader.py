@@ -16,8 +16,8 @@ from automax_ros.core.yaml_text import Mapping as Keys
 from automax_ros.core.yaml_text import Node, Scalar, Sequence, read_yaml
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
-from automax_ros.rackfile.reading.values import Findings, kind_of, report_twice
-from automax_ros.runtime.tasks.standalone_task import LoneTask
+from automax_ros.rackfile.reading.values import ProblemList, kind_of, report_twice
+from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 from automax_ros.scenario.stimuli.rack_verbs import rack_verbs
 from automax_ros.scenario.stimuli.reading import Verb, time_of
 from automax_ros.scenario.stimuli.signals import LoneSignals
@@ -55,13 +55,13 @@ def read_for_rack(path: Path, rack: Rack, *, allow_outside: bool = False) -> Sti
     return _read(path, rack_verbs(rack, path, allow_outside=allow_outside), ())
 
 
-def read_for_task(path: Path, lone: LoneTask) -> StimuliFile:
+def read_for_task(path: Path, lone: StandaloneTask) -> StimuliFile:
     """Read a file for a task alone: set, ramp, sine and square on its variables."""
     return _read(path, value_verbs(LoneSignals(lone)), RACK_ONLY)
 
 
 def _read(path: Path, verbs: Mapping[str, Verb], elsewhere: tuple[str, ...]) -> StimuliFile:
-    findings = Findings()
+    findings = ProblemList()
     source = SourceText(str(path), _text_of(path, findings))
     root = None
     if not findings.errors:
@@ -72,7 +72,7 @@ def _read(path: Path, verbs: Mapping[str, Verb], elsewhere: tuple[str, ...]) -> 
     return StimuliFile(None if findings.errors else tuple(stimuli), findings.in_order(), source)
 
 
-def _text_of(path: Path, findings: Findings) -> str:
+def _text_of(path: Path, findings: ProblemList) -> str:
     try:
         return read_bytes(path, MOST_BYTES).removeprefix(codecs.BOM_UTF8).decode()
     except FileFault as fault:
@@ -87,7 +87,7 @@ def _text_of(path: Path, findings: Findings) -> str:
 class _Reader:
     verbs: Mapping[str, Verb]
     elsewhere: tuple[str, ...]
-    findings: Findings
+    findings: ProblemList
 
     def read(self, root: Node) -> list[Stimulus]:
         """Return the entries of a file; an empty file has none."""

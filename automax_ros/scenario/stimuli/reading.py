@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import exact_ns
 from automax_ros.core.types import DataType, Value
@@ -13,7 +13,7 @@ from automax_ros.core.values import value_of, value_text, wanted
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rackfile.reading.values import (
     Entry,
-    Findings,
+    ProblemList,
     entries_of,
     is_plain_word,
     kind_of,
@@ -25,7 +25,7 @@ from automax_ros.rackfile.reading.values import (
 from automax_ros.scenario.stimuli.signals import Signal, Signals
 from automax_ros.scenario.stimuli.stage import Action
 
-Read = Callable[[Node, str, Findings], Sequence[Action]]
+Read = Callable[[Node, str, ProblemList], Sequence[Action]]
 """Takes what stands after a verb, how to call it in messages, and whom to tell what is wrong with it."""
 
 
@@ -38,7 +38,7 @@ class Verb:
     everywhere: bool = False
 
 
-def named(node: Node, what: str, findings: Findings) -> Iterator[Entry]:
+def named(node: Node, what: str, findings: ProblemList) -> Iterator[Entry]:
     """Yield names with what stands after each; a name that stands twice is reported, as is a verb without any.
 
     What YAML has cut off a name at a comma is passed over: the beginning of the name is reported.
@@ -58,11 +58,11 @@ def named(node: Node, what: str, findings: Findings) -> Iterator[Entry]:
             yield key, value
 
 
-def signal_of(key: Scalar, signals: Signals, findings: Findings) -> Signal | None:
+def signal_of(key: Scalar, signals: Signals, findings: ProblemList) -> Signal | None:
     """Return the signal that a key names."""
     try:
         return signals.find(key.text)
-    except Fault as fault:
+    except UserError as fault:
         findings.add("AMX6735", fault.message, key.span, cut_short(key.text) or fault.hint)
         return None
 
@@ -74,7 +74,7 @@ def cut_short(name: str) -> str | None:
     return 'a name with several subscripts needs quotes here: "DIAG%(1,0)"'
 
 
-def value_for(node: Node, signal: Signal, findings: Findings) -> Value | None:
+def value_for(node: Node, signal: Signal, findings: ProblemList) -> Value | None:
     """Return the value that a node gives a signal, as it would hold it; None where there was something to report."""
     if signal.type is DataType.STRING:
         text = text_value(node, signal.label, findings, limit=1000)
@@ -94,7 +94,7 @@ def value_for(node: Node, signal: Signal, findings: Findings) -> Value | None:
     return value
 
 
-def time_of(node: Node, what: str, findings: Findings) -> int | None:
+def time_of(node: Node, what: str, findings: ProblemList) -> int | None:
     """Return a time in seconds as ns, exactly as it is written."""
     if not is_plain_word(node):
         wrong_kind(node, what, "a time in seconds", findings, number_hint(node))

@@ -14,7 +14,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER
-from automax_ros.runtime.tasks.standalone_task import LoneTask
+from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def _present(meant: LocalElement) -> Value:
 class LoneSignals:
     """The variables of a task without a rack: commons, locals, and tunables within their limits."""
 
-    lone: LoneTask
+    lone: StandaloneTask
     word = "task"
 
     def find(self, name: str) -> Signal:

@@ -18,7 +18,7 @@ class Action(Protocol):
     @property
     def of(self) -> str: ...  # noqa: D102
 
-    def do(self, stage: Stage, /) -> None:
+    def do(self, stage: WavePlayer, /) -> None:
         """Do it, at the scheduler's present.
 
         Raises:
@@ -43,7 +43,7 @@ class Stimulus:
     everywhere: bool = False
 
 
-class Stage:
+class WavePlayer:
     """Time, and the waves that drive signals: at most one each, the latest.
 
     ``is_sampling`` is TRUE while a wave writes a value.
@@ -122,7 +122,7 @@ ENTRIES = 1
 
 
 @dataclass(frozen=True)
-class Happened:
+class OperationRecord:
     """What came of an action: ``what`` is the verb, ``why`` says why it was refused where ``ok`` is FALSE."""
 
     at_ns: int

@@ -11,10 +11,10 @@ from automax_ros.core.text import quoted
 from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import value_text
 from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.rackfile.reading.values import Findings, Section, entries_of, number_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value
 from automax_ros.scenario.stimuli.reading import Verb, named, signal_of, time_of, value_for
 from automax_ros.scenario.stimuli.signals import Signal, Signals
-from automax_ros.scenario.stimuli.stage import Action, Stage, Stimulus
+from automax_ros.scenario.stimuli.stage import Action, Stimulus, WavePlayer
 from automax_ros.scenario.stimuli.waves import MOST_HZ, Ramp, Sine, Square, Wave
 
 LEAST_HZ = 0.0001
@@ -33,7 +33,7 @@ class SetValue:
         """The signal's name."""
         return self.signal.label
 
-    def do(self, stage: Stage) -> None:
+    def do(self, stage: WavePlayer) -> None:
         """Write it."""
         stage.set(self.signal, self.value)
 
@@ -50,7 +50,7 @@ class DriveSignal:
         """The signal's name."""
         return self.signal.label
 
-    def do(self, stage: Stage) -> None:
+    def do(self, stage: WavePlayer) -> None:
         """Begin."""
         stage.drive(self.signal, self.wave)
 
@@ -64,7 +64,7 @@ def goes_on_for_ever(stimuli: Iterable[Stimulus]) -> bool:
 def value_verbs(signals: Signals) -> Mapping[str, Verb]:
     """Return the verbs for the signals of a rack or of a task."""
 
-    def read_set(node: Node, what: str, findings: Findings) -> list[Action]:
+    def read_set(node: Node, what: str, findings: ProblemList) -> list[Action]:
         found: list[Action] = []
         for key, item in named(node, what, findings):
             signal = signal_of(key, signals, findings)
@@ -89,7 +89,7 @@ class _Shape:
     section: Section
     what: str
     span: Span
-    findings: Findings
+    findings: ProblemList
 
     def requires(self, *keys: str) -> bool:
         return self.section.require(keys, self.what, self.span, self.findings)
@@ -117,15 +117,15 @@ class _Shape:
 
 def _wave_reader(
     signals: Signals, keys: tuple[str, ...], read: Callable[[_Shape], Wave | None]
-) -> Callable[[Node, str, Findings], list[Action]]:
-    def read_waves(node: Node, what: str, findings: Findings) -> list[Action]:
+) -> Callable[[Node, str, ProblemList], list[Action]]:
+    def read_waves(node: Node, what: str, findings: ProblemList) -> list[Action]:
         waves = ((shape.signal, read(shape)) for shape in _shapes(node, what, signals, keys, findings))
         return [DriveSignal(signal, wave) for signal, wave in waves if wave is not None]
 
     return read_waves
 
 
-def _shapes(node: Node, what: str, signals: Signals, keys: tuple[str, ...], findings: Findings) -> Iterator[_Shape]:
+def _shapes(node: Node, what: str, signals: Signals, keys: tuple[str, ...], findings: ProblemList) -> Iterator[_Shape]:
     for key, item in named(node, what, findings):
         signal = signal_of(key, signals, findings)
         entries = entries_of(item, f"{quoted(key.text)} of {what}", findings)

@@ -17,13 +17,12 @@ from automax_ros.compile.native.translate.scan_body import Repeated
 from automax_ros.compile.native.translate.translation import translate
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
-
-from .. import programs
-from ..block_model import TICKS, Programmed
-from ..programs import tasks
-from ..support import TICK, compiled_of, views_of
-from ..test_blocks_in_task import BLOCKS, ON_A_RACK, declarations, with_its_structure
-from .identity import assert_same
+from compile import programs
+from compile.block_model import TICKS, Programmed
+from compile.native.identity import assert_same
+from compile.programs import tasks
+from compile.support import TICK, compiled_of, views_of
+from compile.test_blocks_in_task import BLOCKS, ON_A_RACK, declarations, with_its_structure
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
 

@@ -16,9 +16,9 @@ import pytest
 ROOT = Path(__file__).parents[3]
 TESTS = (
     "test/replay/columns",
-    "test/compile/native/test_host.py",
-    "test/compile/native/test_operations.py",
-    "test/replay/test_hostile_drives.py",
+    "test/compile/base/test_host.py",
+    "test/compile/base/test_operations.py",
+    "test/replay/drive_report/test_hostile_drives.py",
 )
 CANARY = "#include <stdlib.h>\nint main(void) { volatile char *a = malloc(4); return a[4]; }\n"
 REPORTS = ("AddressSanitizer", "runtime error:")

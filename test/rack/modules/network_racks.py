@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from automax_ros.rack.modules.network import CYCLE_NS, NetworkModule
-from automax_ros.rack.modules.network_drops import Frame, Sender
+from automax_ros.rack.modules.network_drops import DropMessage, Sender
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 
@@ -83,7 +83,7 @@ class Cable:
         self.racks = racks
         self.cut: set[Rack] = set()
         self.senders = {rack: Sender(1000 + number, 5, rack.config.name) for number, rack in enumerate(racks)}
-        self.carried: list[tuple[Rack, Frame]] = []
+        self.carried: list[tuple[Rack, DropMessage]] = []
         for rack in racks:
             station(rack).connect(self._from(rack))
 
@@ -97,8 +97,8 @@ class Cable:
             for rack in self.racks:
                 rack.run(0.0005)
 
-    def _from(self, rack: Rack) -> Callable[[int, Sequence[Frame]], None]:
-        def send(_: int, frames: Sequence[Frame]) -> None:
+    def _from(self, rack: Rack) -> Callable[[int, Sequence[DropMessage]], None]:
+        def send(_: int, frames: Sequence[DropMessage]) -> None:
             self.carried += [(rack, frame) for frame in frames]
             for other in self.racks:
                 if other is not rack and not {rack, other} & self.cut:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from automax_ros.drive.plant.plant import RAD_S_PER_RPM, DrivePlant
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 
@@ -118,4 +118,4 @@ def rpm(rack: Rack) -> float:
 
 def breaks(rack: Rack, verb: str, text: str, plant: str = "WINDER") -> None:
     """Work on a plant."""
-    Controls(rack).plant(plant, verb, text)
+    SwitchOperations(rack).plant(plant, verb, text)

@@ -19,7 +19,7 @@ from automax_ros.drive.current_loop.signals import (
     VOLTAGE,
     Command,
 )
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 from rack.modules.drive_racks import CYCLE_NS, YAML, Hand, built, controller, turning
 
@@ -196,7 +196,7 @@ def test_the_switches_on_its_front_are_seen_and_let_go(tmp_path):
         rack.run(0.01)
         return hand.seen[-1][1].status & (SWITCH_A | SWITCH_B | RESET_SWITCH)
 
-    controls = Controls(rack)
+    controls = SwitchOperations(rack)
     assert status() == 0
     for position, bit in (("A", SWITCH_A), ("B", SWITCH_B), ("centre", 0)):
         controls.module("7", "test_switch", position)
@@ -294,8 +294,8 @@ def test_a_state_goes_on_bit_for_bit_wherever_it_is_cut(tmp_path, cut_s, armed_f
     rack.write("PERMIT@", True)
     rack.run(min(cut_s, 0.6))
     hand.set(cml_run=True)
-    Controls(rack).module("7", "fault_reset_switch", "true")
-    Controls(rack).module("7", "test_switch", "B")
+    SwitchOperations(rack).module("7", "fault_reset_switch", "true")
+    SwitchOperations(rack).module("7", "test_switch", "B")
     rack.run(max(0.0, cut_s - 0.6))
     state = rack.state()
     kept = {slot: json.loads(json.dumps(state.modules[slot])) for slot in (7, 8, 9)}

@@ -160,4 +160,4 @@ def test_two_common_memories_have_names_of_their_own(tmp_path):
     (tmp_path / "rack.yaml").write_text(text)
     config = load(tmp_path / "rack.yaml").config
     assert [module.name for module in config.modules] == ["common_memory", "processor_1", "common_memory_2"]
-    assert config.home_slot == 0
+    assert config.common_memory_slot == 0

@@ -8,12 +8,12 @@ from dataclasses import replace
 import pytest
 
 from automax_ros.rack.modules.network import CYCLE_NS
-from automax_ros.rack.modules.network_drops import MISSES, MOST_RIVALS, TIMEOUT_CYCLES, Frame, Hearing, Sender
+from automax_ros.rack.modules.network_drops import MISSES, MOST_RIVALS, TIMEOUT_CYCLES, DropMessage, Hearing, Sender
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.network import greatest_depth, registers_of
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 from rack.modules.network_racks import LINE, MASTER, SLAVE, WIND, Cable, built, station
 
@@ -220,8 +220,8 @@ def test_two_masters_are_told_to_all(tmp_path, line, wind):
     assert [item.rack for item in station(wind).status().rivals] == ["LINE2"]
 
 
-def sound(**fields: object) -> Frame:
-    return replace(Frame(3, 2, True, 3, 1, tuple(range(32))), **fields)
+def sound(**fields: object) -> DropMessage:
+    return replace(DropMessage(3, 2, True, 3, 1, tuple(range(32))), **fields)
 
 
 @pytest.mark.parametrize(
@@ -274,7 +274,7 @@ def test_alone_a_rack_waits_in_vain_and_stimuli_write_its_inputs(tmp_path, wind)
     path.write_text("- {at: 0.2, set: {REF%: 700}}\n- {at: 0.3, set: {DROPS%: 9}}\n")
     stimuli = read_for_rack(path, wind).stimuli
     assert stimuli is not None
-    played = Stimulation(stimuli, wind.scheduler)
+    played = StimuliPlayer(stimuli, wind.scheduler)
     wind.start()
     played.begin()
     wind.run(0.15)

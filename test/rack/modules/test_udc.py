@@ -6,8 +6,7 @@ import pytest
 
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.runtime.tasks.task import Status
-
-from .udc_racks import Seen, built
+from rack.modules.udc_racks import Seen, built
 
 A = """\
 10 COMMON CCLK@, A_OUT%, B_SEES%

@@ -12,8 +12,7 @@ from automax_ros.drive.pmi import registers as table
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.state import RackState
 from automax_ros.rackfile.loader import load
-
-from .pmi_racks import CURRENT, IDLE, SPEED_LOOP, breaks, built, rpm, started, winder
+from rack.modules.pmi_racks import CURRENT, IDLE, SPEED_LOOP, breaks, built, rpm, started, winder
 
 BASE_RPM = 1750
 RATED_A = 245.8

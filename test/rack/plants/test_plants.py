@@ -10,8 +10,7 @@ from automax_ros.drive.base.nameplate import NamePlate
 from automax_ros.drive.circuit.ac_line import Rotation
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.plants import PlantConfig
-
-from ..helpers import good, loaded
+from rack.helpers import good, loaded
 
 HEAD = """\
 rack: LINE1

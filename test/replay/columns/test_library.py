@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bags.mutations import CHANGES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from recordings.mutations import CHANGES
 
 from automax_ros.core.types import DataType
 from automax_ros.messages.cdr.cdr import encode
@@ -29,8 +29,7 @@ from automax_ros.replay.columns.native_messages import native_scans, native_writ
 from automax_ros.replay.columns.scans import SCAN, WRITE, scans_by_task, write_columns
 from automax_ros.replay.columns.stretch import LatchedColumns
 from automax_ros.runtime.tasks.task import OVERLAP
-
-from ..replays import recorded
+from replay.replays import recorded
 
 GOLDEN = Path(__file__).parents[3] / "bags" / "section_drive"
 TASKS = ("DRIVE", "LINE", "SPEED")

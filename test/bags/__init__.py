@@ -1,1 +1,0 @@
-"""Tests of recordings: message bytes, writer, reader, export."""

@@ -1,0 +1,13 @@
+import itertools
+
+import pytest
+
+from blocks.support import run
+
+
+@pytest.mark.parametrize("count", range(1, 9))
+def test_truth_table_with_that_many_inputs(count):
+    block = run("OR")
+    for states in itertools.product((False, True), repeat=count):
+        inputs = {f"input{n}": state for n, state in enumerate(states, 1)}
+        assert block.scan(**inputs)["output"] is any(states)

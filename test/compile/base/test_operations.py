@@ -1,0 +1,320 @@
+"""Each operation of C against Python's own: edges with edges, and random values."""
+
+from __future__ import annotations
+
+import math
+import shutil
+
+import pytest
+
+from automax_ros.compile.base import functions
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.blocks.coefficients import raised
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.translate.frame import Unit
+from automax_ros.core import numbers
+from automax_ros.core.numbers import stored_real
+from compile.native.operations import (
+    ANY,
+    BIG,
+    EXACT,
+    FLAG,
+    LONG,
+    WORD,
+    Built,
+    Operation,
+    first_difference,
+    real,
+    rows,
+    translated,
+    whole,
+)
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
+
+
+def sum_of(a, b):
+    return a + b
+
+
+def difference_of(a, b):
+    return a - b
+
+
+def product(a, b):
+    return a * b
+
+
+def quotient(a, b):
+    return a / b
+
+
+def quotient_below(a, b):
+    return a // b
+
+
+def rest_of(a, b):
+    return a % b
+
+
+def negative(a):
+    return -a
+
+
+def inverted(a):
+    return ~a
+
+
+def both_bits(a, b):
+    return a & b
+
+
+def any_bits(a, b):
+    return a | b
+
+
+def other_bits(a, b):
+    return a ^ b
+
+
+def shifted_left(a, b):
+    return a << b
+
+
+def shifted_right(a, b):
+    return a >> b
+
+
+def less(a, b):
+    return a < b
+
+
+def at_most(a, b):
+    return a <= b
+
+
+def equal(a, b):
+    return a == b
+
+
+def unequal(a, b):
+    return a != b
+
+
+def between(a, b, c):
+    return a < b <= c
+
+
+def least(a, b):
+    return min(a, b)
+
+
+def most(a, b):
+    return max(a, b)
+
+
+def magnitude(a):
+    return abs(a)
+
+
+def without_fraction(a):
+    return int(a)
+
+
+def rounded_down(a):
+    return math.floor(a)
+
+
+def as_float(a):
+    return float(a)
+
+
+def truth(a):
+    return bool(a)
+
+
+def chosen(a, b, c):
+    return a if c else b
+
+
+def is_nan(a):
+    return math.isnan(a)
+
+
+def is_finite(a):
+    return math.isfinite(a)
+
+
+def root(a):
+    return math.sqrt(a)
+
+
+def log_of(a):
+    return math.log(a)
+
+
+def power_of_e(a):
+    return math.exp(a)
+
+
+def squared(a):
+    return raised(a, 2.0)
+
+
+def cubed(a):
+    return raised(a, 3.0)
+
+
+def clamped_sum(a, b):
+    value = a + b
+    return numbers.clamp16(value)
+
+
+def held_within(a, b):
+    value = a * 3 + b
+    value = min(value, 32767)
+    return max(value, -32768)
+
+
+SMALL, BITS, COUNT = whole(-100, 100), whole(0, 2**31 - 1), whole(0, 15)
+HALF = whole(-(2**62), 2**62)
+FINITE, REAL_OF_RACK = real(-1e308, 1e308), real(-9.3e18, 9.3e18)
+IN_53_BITS = real(-(2.0**52), 2.0**52)
+TWO = [
+    *(
+        Operation(function, (kind, kind))
+        for function in (sum_of, difference_of, product)
+        for kind in (WORD, LONG, BIG, ANY, FLAG)
+    ),
+    *(Operation(function, pair) for function in (sum_of, product, quotient) for pair in ((LONG, ANY), (ANY, EXACT))),
+    *(Operation(quotient, pair) for pair in ((WORD, WORD), (LONG, LONG), (EXACT, EXACT), (ANY, ANY), (FLAG, WORD))),
+    *(
+        Operation(function, pair)
+        for function in (quotient_below, rest_of)
+        for pair in (
+            (WORD, WORD),
+            (LONG, LONG),
+            (HALF, LONG),
+            (HALF, HALF),
+            (BITS, BITS),
+            (LONG, whole(-7, -1)),
+            (LONG, whole(1, 9)),
+            (BITS, whole(1, 2**31)),
+            (FLAG, FLAG),
+        )
+    ),
+    *(
+        Operation(function, pair)
+        for function in (both_bits, any_bits, other_bits)
+        for pair in ((WORD, WORD), (LONG, WORD), (BIG, BIG), (BITS, LONG), (FLAG, FLAG), (FLAG, LONG))
+    ),
+    *(Operation(shifted_left, pair) for pair in ((WORD, COUNT), (LONG, whole(0, 31)), (HALF, whole(0, 40)))),
+    *(Operation(shifted_right, pair) for pair in ((WORD, COUNT), (LONG, whole(0, 31)), (BIG, whole(0, 62)))),
+    *(
+        Operation(function, pair)
+        for function in (less, at_most, equal, unequal, least, most)
+        for pair in ((LONG, LONG), (BIG, BIG), (ANY, ANY), (FLAG, FLAG))
+    ),
+    *(
+        Operation(function, pair)
+        for function in (less, at_most, equal, unequal)
+        for pair in ((LONG, ANY), (ANY, EXACT), (EXACT, ANY), (FLAG, ANY), (BIG, IN_53_BITS), (IN_53_BITS, BIG))
+    ),
+    Operation(clamped_sum, (WORD, WORD)),
+    Operation(clamped_sum, (BIG, BIG)),
+    Operation(held_within, (LONG, LONG)),
+    Operation(functions.integer_power, (LONG, LONG)),
+    Operation(functions.integer_power, (SMALL, SMALL)),
+    Operation(functions.real_power, (ANY, ANY)),
+    Operation(functions.real_power, (REAL_OF_RACK, real(-40.0, 40.0))),
+    Operation(functions.integer_quotient, (LONG, LONG)),
+    Operation(functions.integer_quotient, (WORD, LONG)),
+    Operation(functions.real_quotient, (ANY, ANY)),
+    Operation(functions.bit_set, (LONG, SMALL)),
+    Operation(functions.bit_clear, (LONG, SMALL)),
+    Operation(functions.bit_test, (LONG, SMALL)),
+    Operation(functions.shift_left, (LONG, SMALL)),
+    Operation(functions.shift_right, (LONG, SMALL)),
+    Operation(functions.rotate_left, (LONG, SMALL)),
+    Operation(functions.rotate_right, (LONG, SMALL)),
+]
+ONE = [
+    *(Operation(negative, (kind,)) for kind in (WORD, LONG, BIG, ANY, FLAG)),
+    *(Operation(inverted, (kind,)) for kind in (WORD, LONG, HALF)),
+    *(Operation(magnitude, (kind,)) for kind in (WORD, LONG, BIG, ANY, FLAG)),
+    *(Operation(as_float, (kind,)) for kind in (FLAG, LONG, BIG, ANY)),
+    *(Operation(truth, (kind,)) for kind in (FLAG, LONG, BIG, ANY)),
+    *(
+        Operation(function, (kind,))
+        for function in (without_fraction, rounded_down)
+        for kind in (LONG, real(-4e18, 4e18), real(-1e30, 1e30), real(-(2.0**125), 2.0**125))
+    ),
+    *(Operation(function, (ANY,)) for function in (is_nan, is_finite)),
+    *(Operation(function, (ANY,)) for function in (stored_real, functions.store_real)),
+    *(Operation(function, (REAL_OF_RACK,)) for function in (squared, cubed)),
+    *(Operation(function, (ANY,)) for function in (squared, cubed)),
+    *(
+        Operation(function, (ANY,))
+        for function in (
+            functions.whole, functions.sign, functions.square_root, functions.sine, functions.cosine, functions.tangent,
+            functions.arc_tangent, functions.natural_logarithm, functions.exponential,
+        )
+    ),
+    Operation(functions.sign, (LONG,)),
+    Operation(numbers.round_count, (real(-1e15, 1e15),)),
+    Operation(numbers.clamp32, (BIG,)),
+]  # fmt: skip
+THREE = [
+    Operation(between, (WORD, ANY, LONG)),
+    Operation(between, (LONG, LONG, LONG)),
+    Operation(chosen, (ANY, ANY, FLAG)),
+    Operation(chosen, (LONG, WORD, FLAG)),
+]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory) -> Built:
+    return Built([*ONE, *TWO, *THREE], NativeCache(tmp_path_factory.mktemp("cache") / "native"))
+
+
+def differences(operations: list[Operation], built: Built, count: int, seed: int) -> list[str]:
+    found = [first_difference(operation, built, rows(operation, count, seed)) for operation in operations]
+    return [text for text in found if text]
+
+
+def test_operations_give_python_s_bits(built) -> None:
+    assert differences([*ONE, *TWO, *THREE], built, 200, 1) == []
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("seed", range(2))
+def test_operations_give_python_s_bits_for_many_values(built, seed) -> None:
+    assert differences([*ONE, *TWO, *THREE], built, 10_000, 2 + seed) == []
+
+
+@pytest.mark.parametrize(
+    "operation",
+    [
+        Operation(quotient, (BIG, BIG)),
+        Operation(less, (BIG, ANY)),
+        Operation(equal, (ANY, BIG)),
+        Operation(least, (ANY, BIG)),
+        Operation(shifted_left, (LONG, LONG)),
+        Operation(shifted_right, (LONG, whole(-1, 3))),
+    ],
+    ids=lambda operation: operation.name,
+)
+def test_what_c_would_do_otherwise_is_not_native(operation) -> None:
+    with pytest.raises(NotNative):
+        translated(operation, Unit())
+
+
+def test_a_wrong_operation_would_be_found(built) -> None:
+    """What C gives for one operation is not what Python gives for its neighbour."""
+    kinds = (real(-4e18, 4e18),)
+    down, toward_zero = Operation(rounded_down, kinds), Operation(without_fraction, kinds)
+    both = Built([down], NativeCache(built.folder))
+    both.translated[toward_zero] = both.translated[down]
+    assert first_difference(down, both, [(-0.5,), (0.5,)]) == ""
+    assert first_difference(toward_zero, both, [(-0.5,), (0.5,)]).endswith("(-0.5,): C gives -1, Python gives 0")

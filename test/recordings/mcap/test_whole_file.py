@@ -1,0 +1,148 @@
+"""Outputs are there whole or not at all; special files are written themselves."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pytest
+
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.whole_file import atomic_write
+from automax_ros.recordings.read.common_log import Cell
+from automax_ros.recordings.tables.export import CommonTable, Table, write_csv
+from automax_ros.recordings.tables.export_npz import write_npz
+from recordings.recordings import sample_recording
+
+
+class Breaking:
+    """A table that breaks off after its third row."""
+
+    def __init__(self, table: Table) -> None:
+        self._table = table
+        self.columns = table.columns
+
+    def rows(self) -> Iterator[tuple[int, Mapping[int, Cell | None]]]:
+        for number, row in enumerate(self._table.rows()):
+            if number == 3:
+                raise BagError("AMX6813", "bag", "broken")
+            yield row
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return sample_recording(tmp_path_factory.mktemp("bags") / "sample", seconds=0.2)
+
+
+@pytest.mark.parametrize("name", ["OUT.csv", "OUT.npz"])
+@pytest.mark.parametrize("before", [None, b"what was there"])
+def test_a_broken_export_changes_nothing(tmp_path: Path, bag: Path, name: str, before: bytes | None) -> None:
+    output = tmp_path / name
+    if before is not None:
+        output.write_bytes(before)
+    table = Breaking(CommonTable(bag, ["REF%"]))
+    with pytest.raises(BagError, match="AMX6813"):
+        write_npz(bag, table, output) if name.endswith("npz") else write_csv(table, output)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == ({} if before is None else {name: before})
+
+
+def test_the_file_appears_at_the_end_with_its_suffix(tmp_path: Path) -> None:
+    output = tmp_path / "OUT.svg"
+    with atomic_write(output) as place:
+        assert (place.parent, place.suffix, place != output) == (tmp_path, ".svg", True)
+        place.write_text("whole")
+        assert not output.exists()
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("OUT.svg", "whole")]
+
+
+def test_links_and_permissions_stay(tmp_path: Path) -> None:
+    target = tmp_path / "there" / "real.csv"
+    target.parent.mkdir()
+    target.write_text("old")
+    target.chmod(0o640)
+    link = tmp_path / "link.csv"
+    link.symlink_to(target)
+    with atomic_write(link) as place:
+        place.write_text("new")
+    assert link.is_symlink()
+    assert (target.read_text(), target.stat().st_mode & 0o777) == ("new", 0o640)
+    with atomic_write(tmp_path / "fresh.csv") as place:
+        place.write_text("new")
+    with (tmp_path / "usual").open("w"):
+        pass
+    assert (tmp_path / "fresh.csv").stat().st_mode == (tmp_path / "usual").stat().st_mode
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everything")
+def test_a_file_that_must_not_be_written_is_not_replaced(tmp_path: Path) -> None:
+    output = tmp_path / "OUT.csv"
+    output.write_text("old")
+    output.chmod(0o444)
+    with pytest.raises(PermissionError), atomic_write(output):
+        pass
+    assert output.read_text() == "old"
+
+
+def test_a_pipe_is_written_itself(tmp_path: Path, bag: Path) -> None:
+    write_csv(CommonTable(bag), tmp_path / "OUT.csv")
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    read: list[str] = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_text()), daemon=True)
+    reader.start()
+    write_csv(CommonTable(bag), pipe)
+    reader.join(240)
+    assert read == [(tmp_path / "OUT.csv").read_text()]
+    assert pipe.is_fifo()
+    write_csv(CommonTable(bag), Path("/dev/null"))
+    assert Path("/dev/null").is_char_device()
+
+
+def test_standard_output_is_written_even_where_it_is_a_file(tmp_path: Path, bag: Path) -> None:
+    """What the shell has opened has to get the table: a file put in its place would lose what others add."""
+    write_csv(CommonTable(bag), tmp_path / "OUT.csv")
+    with (tmp_path / "log").open("wb") as stdout:
+        command = [sys.executable, "-m", "automax_ros.cli.main", "export", str(bag), "-o", "/dev/stdout"]
+        subprocess.run(command, stdout=stdout, check=True, timeout=240)
+        assert os.fstat(stdout.fileno()).st_ino == (tmp_path / "log").stat().st_ino
+    assert (tmp_path / "log").read_text() == (tmp_path / "OUT.csv").read_text()
+
+
+ENDLESS = """\
+import sys
+from automax_ros.recordings.tables.export import CommonTable
+from automax_ros.cli.main import main
+
+def rows(self):
+    while True:
+        yield 0, {}
+
+CommonTable.rows = rows
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
+def test_a_signal_takes_the_half_file_away(tmp_path: Path, bag: Path, number: signal.Signals, code: int) -> None:
+    # A signal that whoever runs the tests ignores, as nohup does, would be ignored by the program too.
+    handler = "default_int_handler" if number == signal.SIGINT else "SIG_DFL"
+    heard = f"import signal\nsignal.signal({int(number)}, signal.{handler})"
+    command = [sys.executable, "-c", f"{heard}\n{ENDLESS}", "export", str(bag), "-o", str(tmp_path / "OUT.csv")]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    try:
+        end = time.monotonic() + 240
+        while not any(path.stat().st_size for path in tmp_path.iterdir()) and time.monotonic() < end:
+            time.sleep(0.02)
+        assert list(tmp_path.iterdir())
+        assert not (tmp_path / "OUT.csv").exists()
+        process.send_signal(number)
+        assert (process.wait(240), list(tmp_path.iterdir())) == (code, [])
+    finally:
+        process.kill()
+        process.communicate()
