@@ -48,7 +48,7 @@ def imports_of(path: Path) -> Iterator[tuple[int, str]]:
 
 def test_version_is_the_same_everywhere():
     versions = {
-        "colcon/package.xml": ElementTree.parse(ROOT / "colcon" / "package.xml").findtext("version"),
+        "package.xml": ElementTree.parse(ROOT / "package.xml").findtext("version"),
         "msg_defs/package.xml": ElementTree.parse(ROOT / "msg_defs" / "package.xml").findtext("version"),
         "installed": metadata.version("automax_ros"),
     }
@@ -56,7 +56,7 @@ def test_version_is_the_same_everywhere():
 
 
 def test_package_xml_names_the_messages_and_the_build_type():
-    package = ElementTree.parse(ROOT / "colcon" / "package.xml")
+    package = ElementTree.parse(ROOT / "package.xml")
     assert package.getroot().get("format") == "3"
     assert package.findtext("export/build_type") == "ament_python"
     assert "automax_msgs" in [element.text for element in package.findall("exec_depend")]
@@ -68,7 +68,7 @@ def test_package_xml_names_what_is_imported_and_nothing_else():
     sources = [path for folder in ("automax_ros", "launch", "examples") for path in (ROOT / folder).rglob("*.py")]
     imported = {name.partition(".")[0] for path in sources for _, name in imports_of(path)}
     keys = {ROSDEP_KEYS.get(name, name) for name in imported - set(sys.stdlib_module_names) - WITHOUT_KEY}
-    package = ElementTree.parse(ROOT / "colcon" / "package.xml")
+    package = ElementTree.parse(ROOT / "package.xml")
     named = [element.text for element in package.findall("exec_depend")]
     assert sorted(named) == sorted({*keys, "rosgraph_msgs"})  # /clock's type is made by its name
 
@@ -88,7 +88,7 @@ def test_empy_that_cannot_build_the_messages_is_not_installed(version):
 
 
 def test_ament_index_marker_is_there_and_empty():
-    assert (ROOT / "colcon" / "resource" / "automax_ros").read_bytes() == b""
+    assert (ROOT / "resource" / "automax_ros").read_bytes() == b""
 
 
 def test_every_folder_with_sources_is_a_python_package():
@@ -291,7 +291,7 @@ def test_messages_of_another_version_name_the_command(monkeypatch, trouble):
         monkeypatch.delattr(messages, "TaskTable")
     else:
         monkeypatch.setattr(messages, "TaskTable", messages.TaskInfo)
-    with pytest.raises(RosUnavailable, match=r"another version .*TaskTable.*`(make setup|colcon build)`"):
+    with pytest.raises(RosUnavailable, match=r"another version .*TaskTable.*`(make setup|colcon build .*)`"):
         environment.prepare(may_restart=False)
 
 

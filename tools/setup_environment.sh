@@ -36,7 +36,7 @@ interpreter_of() {
 fingerprint() {
     {
         echo "$PWD"
-        cat pyproject.toml setup.cfg automax_ros/__init__.py tools/setup_environment.sh \
+        cat pyproject.toml setup.py package.xml automax_ros/__init__.py tools/setup_environment.sh \
             tools/build_messages.py tools/compiler_parts.py tools/message_code.py tools/message_libraries.py \
             msg_defs/package.xml
         tail -n +1 msg_defs/msg/*.msg msg_defs/srv/*.srv
@@ -48,16 +48,16 @@ install() {
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-compile "$@"
 }
 
-# What the messages are built with: a line each of setup.cfg.
+# What the messages are built with, a line each. setup.py is read, not run: it needs setuptools, which may not be there yet.
 needed_by_messages() {
     "$venv/bin/python" - <<'END'
-from configparser import RawConfigParser
+import ast
 
-parser = RawConfigParser()
-parser.read("setup.cfg", encoding="utf-8")
-extras = parser["options.extras_require"]
-for text in (parser["options"]["install_requires"], extras["ros"], extras["build"]):
-    print(text.strip())
+with open("setup.py", encoding="utf-8") as file:
+    tree = ast.parse(file.read())
+stated = {ast.unparse(node.targets[0]): node.value for node in tree.body if isinstance(node, ast.Assign)}
+needed, extras = (ast.literal_eval(stated[name]) for name in ("NEEDED", "EXTRAS"))
+print(*needed, *extras["ros"], *extras["build"], sep="\n")
 END
 }
 

