@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.cdr.cdr import CdrError, decode, encoder
@@ -21,8 +20,7 @@ from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
 from automax_ros.ros.intake.rack_lock import RackLock
-from automax_ros.ros.intake.raw_messages import taker_of
-from automax_ros.ros.intake.rcl import library
+from automax_ros.ros.intake.raw_messages import TopicReader
 from automax_ros.runtime.time.following_pacer import FollowingPacer
 from automax_ros.runtime.time.pacer import Pace, Pacer
 from automax_ros.runtime.time.scheduler import Scheduler
@@ -81,7 +79,7 @@ class RackClock:
         elif self._follower is not None:
             subscription = node.own_subscription(message_class(_TYPE), CLOCK, ros_qos(_HEARD))
             self._topic = subscription.topic_name
-            site.door.add(_ClockWay(subscription, self._hear), last=True)
+            site.door.add(TopicReader(subscription, _MOST_BYTES, lambda taken: self._hear(taken.payload)), last=True)
 
     def wait(self, should_stop: Callable[[], bool], on_idle: Callable[[int], None] | None = None) -> bool:
         """Wait until the rack can start; return False if asked to stop. ``on_idle`` gets rack time meanwhile, 0."""
@@ -147,27 +145,6 @@ class RackClock:
         self._site.health.note(JUMP, by_ns > 0, lambda: text)
         if self._telling.passes():
             self._node.get_logger().warning(text)
-
-
-class _ClockWay:
-    """The subscription to ``/clock``, as ``MessageIntake`` reads it."""
-
-    def __init__(self, subscription: Any, hear: Callable[[bytes | None], None]) -> None:
-        self.name, self.handle = subscription.topic_name, subscription.handle
-        self._taker, self._hear = taker_of(subscription, _MOST_BYTES), hear
-
-    def take(self) -> bool:
-        """Take the next message."""
-        taken = self._taker.take()
-        if taken is not None:
-            self._hear(taken.payload)
-        return taken is not None
-
-    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Set the C function that rcl calls for each message."""
-        rcl = library()
-        assert rcl is not None
-        return int(rcl.on_message(pointer, callback, data))
 
 
 def _unsent(_: bytes) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
@@ -16,8 +17,7 @@ from automax_ros.rackfile.reading.scale import Scale
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
-from automax_ros.ros.intake.raw_messages import RawMessage, SequenceTracker, taker_of
-from automax_ros.ros.intake.rcl import library
+from automax_ros.ros.intake.raw_messages import RawMessage, SequenceTracker, TopicReader
 from automax_ros.runtime.memory.views import MemoryValueError
 
 REFUSAL_INTERVAL_S = 1.0
@@ -69,7 +69,8 @@ class WriteTopic:
 
     def _subscribe(self, qos: QosProfile, events: SubscriptionEventCallbacks | None) -> None:
         subscription = self._node.own_subscription(self._class, self._topic, ros_qos(qos), events)
-        self._node.site.door.add(_Way(self, subscription, self._most_bytes, reliable=qos is COMMAND))
+        receive = partial(self.receive, reliable=qos is COMMAND)
+        self._node.site.door.add(TopicReader(subscription, self._most_bytes, receive))
 
     def _not_heard(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
         if info.last_policy_kind != QoSPolicyKind.RELIABILITY:
@@ -104,28 +105,6 @@ class WriteTopic:
         self._node.site.health.note(DROPPED, self._topic, lambda: text, times=missing)
         if self._throttle.passes():
             self._node.get_logger().warning(text)
-
-
-class _Way:
-    """One of the two subscriptions of a ``WriteTopic``, as ``MessageIntake`` reads it."""
-
-    def __init__(self, inlet: WriteTopic, subscription: Any, most_bytes: int, *, reliable: bool) -> None:
-        self.name, self.handle = subscription.topic_name, subscription.handle
-        self._inlet, self._reliable = inlet, reliable
-        self._taker = taker_of(subscription, most_bytes)
-
-    def take(self) -> bool:
-        """Take the next message."""
-        taken = self._taker.take()
-        if taken is not None:
-            self._inlet.receive(taken, reliable=self._reliable)
-        return taken is not None
-
-    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Set the C function that rcl calls for each message."""
-        rcl = library()
-        assert rcl is not None
-        return int(rcl.on_message(pointer, callback, data))
 
 
 class ScaledWriter:

@@ -11,8 +11,7 @@ from rclpy.qos import QoSProfile
 from automax_ros.messages.cdr.cdr import CdrError, decode
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import message_class
-from automax_ros.ros.intake.raw_messages import taker_of
-from automax_ros.ros.intake.rcl import library
+from automax_ros.ros.intake.raw_messages import RawMessage, TopicReader
 
 PARTICIPANT_BYTES = 12
 """Length of the part of a GID that all publishers of one process share."""
@@ -48,20 +47,16 @@ class BusTopic:
     ) -> None:
         """Subscribe, and register at the message intake."""
         subscription = node.own_subscription(message_class(type_name), topic, qos)
-        self.name, self.handle = subscription.topic_name, subscription.handle
         self._topic, self._type_name, self._then = topic, type_name, terms.then
         self._receive, self._refuse = node.guarded_callback(topic, receive), refuse
-        self._taker = taker_of(subscription, terms.most_bytes)
-        node.site.door.add(self, share=terms.share)
+        reader = TopicReader(subscription, terms.most_bytes, self._take)
+        self.name, self.take = reader.name, reader.take
+        node.site.door.add(reader, share=terms.share)
 
-    def take(self) -> bool:
-        """Take the next message; return False if there is none."""
-        taken = self._taker.take()
-        if taken is None:
-            return False
+    def _take(self, taken: RawMessage) -> None:
         if taken.payload is None:
             self._refuse(self._topic, f"a message of {taken.size:,} bytes")
-            return True
+            return
         try:
             message = decode(self._type_name, taken.payload)
         except CdrError as error:
@@ -70,10 +65,3 @@ class BusTopic:
             self._receive(message, taken.sender[:PARTICIPANT_BYTES])
             if self._then is not None:
                 self._then(message)
-        return True
-
-    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Set the C function that rcl calls for each message."""
-        rcl = library()
-        assert rcl is not None
-        return int(rcl.on_message(pointer, callback, data))

@@ -9,6 +9,7 @@ quality of service keeps, until they are taken; those longer than wanted are nev
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 from automax_ros.ros.intake.rcl import OK, TAKE_FAILED, Bytes, Library, MessageInfo, library
@@ -92,6 +93,27 @@ class _RclpyTaker:
         return RawMessage(
             kept, len(payload), info["source_timestamp"], info.get("publication_sequence_number") or 0, b""
         )
+
+
+class TopicReader:
+    """One subscription as ``MessageIntake`` reads it; ``receive`` is called with each message."""
+
+    def __init__(self, subscription: Any, most_bytes: int, receive: Callable[[RawMessage], None]) -> None:
+        self.name, self.handle = subscription.topic_name, subscription.handle
+        self._taker, self._receive = taker_of(subscription, most_bytes), receive
+
+    def take(self) -> bool:
+        """Take the next message; return False if there is none."""
+        taken = self._taker.take()
+        if taken is not None:
+            self._receive(taken)
+        return taken is not None
+
+    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
+        """Set the C function that rcl calls for each message."""
+        rcl = library()
+        assert rcl is not None
+        return int(rcl.on_message(pointer, callback, data))
 
 
 MOST_SENDERS = 64

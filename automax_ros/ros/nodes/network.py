@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
@@ -29,8 +28,7 @@ from automax_ros.rackfile.reading.names import is_rack_name
 from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
-from automax_ros.ros.intake.raw_messages import taker_of
-from automax_ros.ros.intake.rcl import library
+from automax_ros.ros.intake.raw_messages import TopicReader
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 TELL_INTERVAL_S = 0.2
@@ -55,7 +53,9 @@ class NetworkNode(ModuleNode):
         self._told: tuple[object, ...] = ("", (), ())
         self._throttle = Throttle(TELL_INTERVAL_S)
         self._publish = self.outlet(Topic(name, TYPE, NETWORK, self._slot))
-        site.door.add(_Cable(self.own_subscription(message_class(TYPE), name, ros_qos(NETWORK)), self._waiting))
+        subscription = self.own_subscription(message_class(TYPE), name, ros_qos(NETWORK))
+        # Messages wait for the next cycle; b"" replaces one that is too long.
+        site.door.add(TopicReader(subscription, MOST_BYTES, lambda taken: self._waiting.append(taken.payload or b"")))
         module.connect(self._send)
         scheduler, key = site.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
         scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._look())
@@ -125,27 +125,6 @@ class NetworkNode(ModuleNode):
             **{name: str(count) for name, count in status.counters},
         }
         return [self.status(self._model, level, text, self._slot, values)]
-
-
-class _Cable:
-    """The network's topic, as ``MessageIntake`` reads it: messages are queued for the next cycle."""
-
-    def __init__(self, subscription: Any, waiting: deque[bytes]) -> None:
-        self.name, self.handle, self._waiting = subscription.topic_name, subscription.handle, waiting
-        self._taker = taker_of(subscription, MOST_BYTES)
-
-    def take(self) -> bool:
-        """Queue the next message; b"" replaces one that is too long."""
-        taken = self._taker.take()
-        if taken is not None:
-            self._waiting.append(taken.payload or b"")
-        return taken is not None
-
-    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
-        """Set the C function that rcl calls for each message."""
-        rcl = library()
-        assert rcl is not None
-        return int(rcl.on_message(pointer, callback, data))
 
 
 def _read(payload: bytes) -> tuple[Sender, DropMessage] | None:

@@ -1,4 +1,4 @@
-"""Names and values from a command line; test/cli/test_run.py has the messages."""
+"""Names and values from a command line; test/cli/run/test_run.py has the messages."""
 
 import pytest
 from hypothesis import given
