@@ -53,11 +53,6 @@ def phase_of(number: int) -> int:
     return _PLACES[number][0]
 
 
-def rail_of(number: int) -> int:
-    """Return the rail of an SCR: 0 for P, 1 for M."""
-    return _PLACES[number][1]
-
-
 def direction_of(number: int) -> int:
     """Return +1 for an SCR that conducts from its phase to its rail, -1 for one from the rail to the phase."""
     return _PLACES[number][2]

@@ -180,28 +180,6 @@ class DriveTrigger:
         return self._task.port.next_ns
 
 
-class ModuleTrigger:
-    """The module itself decides when a scan is due, while the trigger is ``armed``."""
-
-    def __init__(self, scheduler: Scheduler) -> None:
-        """Create unarmed."""
-        self._scheduler = scheduler
-        self.armed = False
-
-    def arm(self, first_ns: int, due: Due) -> None:  # noqa: ARG002
-        """Include the task in the module's scans."""
-        self.armed = True
-
-    def disarm(self) -> None:
-        """Exclude the task from the module's scans."""
-        self.armed = False
-
-    @property
-    def next_ns(self) -> int | None:
-        """Now, while it is armed."""
-        return self._scheduler.now_ns if self.armed else None
-
-
 def usual_trigger(task: Task, events: Events, scheduler: Scheduler, expired: Callable[[Task], None]) -> Trigger:
     """Return the trigger of a Processor's task: the event that its SCAN_LOOP names, else the clock (4.0).
 

@@ -35,7 +35,6 @@ class Enclave:
 
 
 LOG, EVENTS = "/rosout", "/parameter_events"
-_OWN_ALWAYS = (LOG, EVENTS)
 
 
 def recorder_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:

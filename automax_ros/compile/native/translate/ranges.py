@@ -97,7 +97,6 @@ class Range:
 
 ANY_REAL = Range(Kind.REAL, -INFINITE, INFINITE)
 ANY_BOOL = Range(Kind.BOOL, 0, 1)
-UNBOUNDED = Range(Kind.INT, -INFINITE, INFINITE)
 
 _INTEGER_STEPS: tuple[float, ...] = (0, 1, 32768, 2**31 - 1, 2**31, 2**33, 2**40, 2**53, 2**62, 2**100, INFINITE)
 _REAL_STEPS: tuple[float, ...] = (
