@@ -29,7 +29,10 @@ from automax_ros.language.tree.tree import (
     Assignment,
     Call,
     ClearErrorLog,
+    Data,
+    Declaration,
     End,
+    Event,
     Expression,
     For,
     Gosub,
@@ -316,9 +319,9 @@ class StatementLowering:
         return condition
 
     def _lower_simple(self, statement: Statement) -> None:
-        carry_out = _SIMPLE.get(type(statement))
-        if carry_out is None:
+        if isinstance(statement, _NOTHING_TO_DO):
             return
+        carry_out = _SIMPLE[type(statement)]
         with self.emitter.statement(self.emitter.line):
             if not isinstance(statement, Call):
                 self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
@@ -393,6 +396,7 @@ class StatementLowering:
         """Emit nothing for a remark; its time is added by the frame of every statement."""
 
 
+_NOTHING_TO_DO = (Declaration, Data, Event, Label)
 _Carry = Callable[[StatementLowering, Statement], None]
 _SIMPLE: dict[type, _Carry] = {
     Assignment: StatementLowering._assign,  # type: ignore[dict-item]

@@ -70,7 +70,7 @@ class RequestForwarder:
         """Answer a request: at once if it concerns this process alone, else when all processes have answered."""
         if service in _NOT_TOGETHER:
             return _refused(response, NOT_TOGETHER)
-        shares = _SHARING.get(service, _mine)(self, request, kind)
+        shares = _SHARING[service](self, request, kind)
         if [share.seat for share in shares] == [THIS_PROCESS]:
             return local(shares[0].request, response)
         absent = [
@@ -317,6 +317,8 @@ _SHARING: dict[str, Callable[[RequestForwarder, Any, Any], list[Target]]] = {
     "errors": _by_task,
     "run_all": _everybody,
     "power": _everybody,
+    "stop_all": _mine,
+    "set": _mine,
     "force": _by_name,
     "tune": _by_name,
     "unforce": _by_names,
@@ -327,4 +329,4 @@ _SHARING: dict[str, Callable[[RequestForwarder, Any, Any], list[Target]]] = {
     "tasks": _everybody,
     "status": _status,
 }
-"""Returns the processes that a request concerns, by service; all other services concern common memory alone."""
+"""Returns the processes that a request concerns, by service; ``_mine``: it concerns common memory alone."""
