@@ -23,9 +23,9 @@ from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig, Timing
 from automax_ros.recordings.write.recorder import Recorder
-from automax_ros.sweep.blueprint import RackTemplate
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.points import Point, grid, read_varied
+from automax_ros.sweep.rack_template import RackTemplate
 from automax_ros.sweep.run import Plan, run_points
 from automax_ros.sweep.sweeping import run_sweep
 

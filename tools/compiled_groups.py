@@ -35,9 +35,9 @@ _COLD = ("drive/base/nameplate.py", "drive/circuit/steady.py", *(f"drive/assess/
 """Files that a drive's tools use only once: compiling takes longer than it saves."""
 
 _SCANS = (
-    "runtime/scan/processor_time.py",
+    "runtime/scan/modeled_execution.py",
     "runtime/scan/scan_record.py",
-    "runtime/scan/scan_under_way.py",
+    "runtime/scan/scan_in_progress.py",
     "runtime/time/scheduler.py",
     "runtime/tasks/task.py",
     "runtime/scan/task_io.py",

@@ -10,7 +10,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from automax_ros.cli import early
+from automax_ros.cli import startup_signals as early
 
 if TYPE_CHECKING:
     import argparse

@@ -21,9 +21,9 @@ from automax_ros.rack.base.part import RackPart
 from automax_ros.rack.base.views import backplane_of, view_specs
 from automax_ros.rack.modules.building import build_module
 from automax_ros.rack.modules.module import Module, RackServices
-from automax_ros.rack.operate.forces import Force, ForceTable
-from automax_ros.rack.operate.operations import Operations, begin_memory
-from automax_ros.rack.operate.values import ValueOperations
+from automax_ros.rack.operations.forces import Force, ForceTable
+from automax_ros.rack.operations.operations import Operations, begin_memory
+from automax_ros.rack.operations.values import ValueOperations
 from automax_ros.rack.plants.feeding import PlantFeeds
 from automax_ros.rack.plants.plants import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
@@ -43,7 +43,7 @@ from automax_ros.runtime.scan.channels import Channels
 from automax_ros.runtime.scan.drives import Drives
 from automax_ros.runtime.scan.events import Events
 from automax_ros.runtime.scan.execution import IDEAL, Execution
-from automax_ros.runtime.scan.processor_time import ModeledExecution
+from automax_ros.runtime.scan.modeled_execution import ModeledExecution
 from automax_ros.runtime.tasks.interrupts import Interrupts
 from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, Task
 from automax_ros.runtime.time.scheduler import Scheduler

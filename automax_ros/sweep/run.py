@@ -17,10 +17,10 @@ from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import MOST_BYTES, read_for_rack
-from automax_ros.sweep.blueprint import RackTemplate
 from automax_ros.sweep.measures import FUNCTIONS, Measure, Subject
 from automax_ros.sweep.points import Point
 from automax_ros.sweep.quantities import Beginning, Quantity
+from automax_ros.sweep.rack_template import RackTemplate
 from automax_ros.sweep.watching import Watch
 
 _SLICE_NS = 100 * NS_PER_MS

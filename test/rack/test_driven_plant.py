@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from rack.helpers import good

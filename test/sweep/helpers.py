@@ -5,9 +5,9 @@ from pathlib import Path
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from automax_ros.sweep.blueprint import RackTemplate
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.points import read_varied
+from automax_ros.sweep.rack_template import RackTemplate
 from automax_ros.sweep.run import Plan, Stimuli
 
 RACK = """\

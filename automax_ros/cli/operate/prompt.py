@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from automax_ros.cli.operate.actions import ACTIONS, add_actions
 from automax_ros.cli.operate.requests import ServiceCall
 from automax_ros.cli.operate.session import Session, connected
-from automax_ros.cli.output.prompt import Interrupt, edit_lines, typed_lines
+from automax_ros.cli.shell.prompt import Interrupt, edit_lines, typed_lines
 from automax_ros.core.user_error import UserError
 
 _QUIT = ("quit", "exit")

@@ -10,7 +10,7 @@ from automax_ros.core.user_error import UsageError
 from automax_ros.rack.rack import Rack
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import StimuliFile, read_for_rack
-from automax_ros.scenario.stimuli.stage import Stimulus
+from automax_ros.scenario.stimuli.wave_player import Stimulus
 
 
 class StimuliRefused(Exception):

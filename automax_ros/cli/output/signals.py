@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from automax_ros.cli.early import EARLY
+from automax_ros.cli.startup_signals import EARLY
 
 _SIGNALLED = 128
 """The shell's offset: the exit code of a command ended by a signal is this plus the signal's number."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from automax_ros.cli.racks.step_session import CommandFault, Session
 from automax_ros.core.text import count_of, near_or_listed, quoted, table
-from automax_ros.rack.operate.operations import Operations
+from automax_ros.rack.operations.operations import Operations
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from automax_ros.language.tree.tree import Scope
 from automax_ros.runtime.tasks.standalone_task import LoneVariable, StandaloneTask
 from automax_ros.runtime.time.scheduler import Scheduler
 from automax_ros.scenario.stimuli.player import StimuliPlayer
-from automax_ros.scenario.stimuli.stage import Stimulus
+from automax_ros.scenario.stimuli.wave_player import Stimulus
 
 _SCAN, _TIME = "scan", "time_s"
 _NOT_SET = (_SCAN, _TIME, "duration_ns", "skipped", "errors", "error_line", "error_code")

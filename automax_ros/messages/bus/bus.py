@@ -19,7 +19,7 @@ from automax_ros.messages.cdr.parts import CdrError
 from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Values, values_of
 from automax_ros.messages.types.topics import QosProfile
 from automax_ros.rack.base.stop_cause import StopCause
-from automax_ros.rack.distributed.link import Batch, HeldForce, ImageCopy, StopState
+from automax_ros.rack.distributed.image_sync import Batch, HeldForce, ImageCopy, StopState
 from automax_ros.rack.distributed.versions import VersionedValue
 
 AHEAD_NS = 60 * NS_PER_S

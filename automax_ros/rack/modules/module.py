@@ -126,7 +126,7 @@ class Operable(Protocol):
         """Move a control of ``controls`` to one of its positions.
 
         Raises:
-            OperationRefused: it cannot be moved now (rack/operate/operations.py).
+            OperationRefused: it cannot be moved now (rack/operations/operations.py).
         """
         ...
 

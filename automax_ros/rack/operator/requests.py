@@ -23,7 +23,7 @@ from automax_ros.core.types import DataType, Value, type_of_name
 from automax_ros.core.values import source_text, value_of, wanted
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import PreparedReload, RackError
 from automax_ros.rackfile.model.config import CommonVariable

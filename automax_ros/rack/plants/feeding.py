@@ -13,7 +13,7 @@ from automax_ros.core.types import Value
 from automax_ros.drive.plant.plant import DrivePlant
 from automax_ros.drive.plant.signals import SIGNALS
 from automax_ros.rack.base.observers import Observers
-from automax_ros.rack.operate.operations import Operations
+from automax_ros.rack.operations.operations import Operations
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.plants import FeedConfig
 from automax_ros.rackfile.model.writers import writers_of

@@ -15,7 +15,7 @@ from automax_ros.rack.tasks.statistics import TaskStatistics
 from automax_ros.rack.tasks.triggers import Due, MakeTrigger
 from automax_ros.runtime.memory.process_inputs import ProcessInputs
 from automax_ros.runtime.scan.execution import Execution, IdealExecution, Steps
-from automax_ros.runtime.scan.scan_under_way import Progress
+from automax_ros.runtime.scan.scan_in_progress import Progress
 from automax_ros.runtime.tasks.task import OVERLAP, ScanRecord, Status, Task
 from automax_ros.runtime.time.scheduler import Scheduler
 

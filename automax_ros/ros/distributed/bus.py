@@ -41,7 +41,7 @@ from automax_ros.messages.bus.bus import (
 from automax_ros.messages.bus.peers import BEAT_NS, Peer, Peers, PresenceVerdict
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Stage
-from automax_ros.rack.distributed.link import Batch, ImageCopy, ImageSync
+from automax_ros.rack.distributed.image_sync import Batch, ImageCopy, ImageSync
 from automax_ros.rackfile.model.config import ModuleLoss
 from automax_ros.rackfile.model.driven import driven_plants
 from automax_ros.rackfile.processes import part_name

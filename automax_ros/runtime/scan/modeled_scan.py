@@ -7,8 +7,8 @@ from typing import Any, Protocol
 from automax_ros.compile.base.scan_io import ScanTooLong
 from automax_ros.compile.compiler import ScanSteps
 from automax_ros.runtime.memory.views import Memory
+from automax_ros.runtime.scan.scan_in_progress import Begun
 from automax_ros.runtime.scan.scan_record import Status, Steps
-from automax_ros.runtime.scan.scan_under_way import Begun
 
 
 class Stepped(Protocol):

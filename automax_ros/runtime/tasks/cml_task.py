@@ -25,8 +25,8 @@ from automax_ros.runtime.scan.drive_record import noted_command, noted_measured,
 from automax_ros.runtime.scan.drives import DriveAccess, DrivePort, Drives
 from automax_ros.runtime.scan.error_log import LOG_NUMBERS
 from automax_ros.runtime.scan.events import Events
+from automax_ros.runtime.scan.scan_in_progress import Begun
 from automax_ros.runtime.scan.scan_record import ScanRecord, Status
-from automax_ros.runtime.scan.scan_under_way import Begun
 from automax_ros.runtime.scan.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.runtime.tasks.task import Task
 

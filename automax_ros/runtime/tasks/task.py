@@ -18,8 +18,7 @@ from automax_ros.runtime.memory.views import Memory
 from automax_ros.runtime.scan.error_log import LOG_NUMBERS, ErrorLog, LogEntry, snapshot_layout
 from automax_ros.runtime.scan.events import Events
 from automax_ros.runtime.scan.modeled_scan import scan_in_steps
-from automax_ros.runtime.scan.scan_record import ScanRecord, Status, Steps
-from automax_ros.runtime.scan.scan_under_way import (
+from automax_ros.runtime.scan.scan_in_progress import (
     Begun,
     Progress,
     ReplayableReads,
@@ -27,6 +26,7 @@ from automax_ros.runtime.scan.scan_under_way import (
     add_error,
     cleared_errors,
 )
+from automax_ros.runtime.scan.scan_record import ScanRecord, Status, Steps
 from automax_ros.runtime.scan.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.runtime.scan.tunable_value import tunable_value
 

@@ -12,7 +12,7 @@ from automax_ros.core.types import Value
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
-from automax_ros.scenario.stimuli.stage import WavePlayer
+from automax_ros.scenario.stimuli.wave_player import WavePlayer
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.faults import VERBS, PlantVerb, values_of
 from automax_ros.rack.modules.module import Operable
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.reading.values import Entry, ProblemList, Section, entries_of, integer_value, kind_of
 from automax_ros.scenario.stimuli.actions import Control
 from automax_ros.scenario.stimuli.reading import Verb, named
-from automax_ros.scenario.stimuli.stage import Action
+from automax_ros.scenario.stimuli.wave_player import Action
 
 
 def read_plant_work(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:

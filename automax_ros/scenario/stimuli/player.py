@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
-from automax_ros.scenario.stimuli.stage import ENTRIES, Action, OperationRecord, Stimulus, WavePlayer, in_time
+from automax_ros.scenario.stimuli.wave_player import ENTRIES, Action, OperationRecord, Stimulus, WavePlayer, in_time
 
 _KEY = EventKey(EventClass.OUTSIDE, ENTRIES, "stimuli")
 

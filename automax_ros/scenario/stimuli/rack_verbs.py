@@ -34,8 +34,8 @@ from automax_ros.scenario.stimuli.actions import OnRack, OnTask, OnValue, Reload
 from automax_ros.scenario.stimuli.plant_verbs import control_verbs
 from automax_ros.scenario.stimuli.reading import Read, Verb, cut_short, named, time_of, value_for
 from automax_ros.scenario.stimuli.signals import RackSignals, Signal, local_signal
-from automax_ros.scenario.stimuli.stage import Action
 from automax_ros.scenario.stimuli.values import value_verbs
+from automax_ros.scenario.stimuli.wave_player import Action
 
 ALL = "all"
 _PATH_LIMIT = 200

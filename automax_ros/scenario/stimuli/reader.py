@@ -21,8 +21,8 @@ from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 from automax_ros.scenario.stimuli.rack_verbs import rack_verbs
 from automax_ros.scenario.stimuli.reading import Verb, time_of
 from automax_ros.scenario.stimuli.signals import LoneSignals
-from automax_ros.scenario.stimuli.stage import Stimulus
 from automax_ros.scenario.stimuli.values import value_verbs
+from automax_ros.scenario.stimuli.wave_player import Stimulus
 
 MOST_BYTES = 2_000_000
 MOST_ENTRIES = 50_000

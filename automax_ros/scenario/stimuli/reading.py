@@ -23,7 +23,7 @@ from automax_ros.rackfile.reading.values import (
     wrong_kind,
 )
 from automax_ros.scenario.stimuli.signals import Signal, Signals
-from automax_ros.scenario.stimuli.stage import Action
+from automax_ros.scenario.stimuli.wave_player import Action
 
 Read = Callable[[Node, str, ProblemList], Sequence[Action]]
 """Called with the node after a verb, the verb's name in messages, and the list for its problems."""

@@ -14,7 +14,7 @@ from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value
 from automax_ros.scenario.stimuli.reading import Verb, named, signal_of, time_of, value_for
 from automax_ros.scenario.stimuli.signals import Signal, Signals
-from automax_ros.scenario.stimuli.stage import Action, Stimulus, WavePlayer
+from automax_ros.scenario.stimuli.wave_player import Action, Stimulus, WavePlayer
 from automax_ros.scenario.stimuli.waves import MOST_HZ, Ramp, Sine, Square, Wave
 
 LEAST_HZ = 0.0001

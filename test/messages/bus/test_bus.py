@@ -10,7 +10,7 @@ from automax_ros.messages.bus.peers import HUNG_NS, MISSING_NS, SILENCE_NS, Peer
 from automax_ros.messages.cdr.cdr import CdrError, decode, encode
 from automax_ros.messages.types.messages import NAMES, BusImage, BusWrite, Presence, Stage, Values
 from automax_ros.rack.base.stop_cause import StopCause
-from automax_ros.rack.distributed.link import Batch, HeldForce, ImageCopy, StopState
+from automax_ros.rack.distributed.image_sync import Batch, HeldForce, ImageCopy, StopState
 from automax_ros.rack.distributed.versions import VersionedValue
 
 TEXTS = frozenset({4})

@@ -10,7 +10,7 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.bus.bus import AHEAD_NS, BusLimits, with_standing
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Values
-from automax_ros.rack.distributed.link import StopState
+from automax_ros.rack.distributed.image_sync import StopState
 
 SEATS = {1: (1, 7), 3: (3,)}
 WALL_NS = 1_800_000_000 * NS_PER_S

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from automax_ros.rack.distributed.link import Batch, ImageSync
+from automax_ros.rack.distributed.image_sync import Batch, ImageSync
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig

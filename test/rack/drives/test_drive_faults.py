@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.operator.faults import Display, DriveTrips, displays_of
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from replay.replays import record, replayed
 
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from rack.drives.test_drive_faults import CML, FAULTS, SPEED, YAML, active, logged, reset, start

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.runtime.scan.processor_time import ModeledExecution
+from automax_ros.runtime.scan.modeled_execution import ModeledExecution
 
 HEAD = """\
 10 COMMON A%, B%, C%, D!, X@, R, T%(5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from automax_ros.drive.plant.plant import RAD_S_PER_RPM, DrivePlant
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 

@@ -19,7 +19,7 @@ from automax_ros.drive.current_loop.signals import (
     VOLTAGE,
     Command,
 )
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 from rack.modules.drive_racks import CYCLE_NS, YAML, Hand, built, controller, turning
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rack.helpers import good, loaded
 
 from automax_ros.core.kinds import WriterKind
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 

@@ -6,7 +6,7 @@ import pytest
 
 from automax_ros.core.kinds import WriterKind
 from automax_ros.messages.types.messages import CommonWrite
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.recordings.info.info import bag_info
 from automax_ros.recordings.read.reader import BagReader

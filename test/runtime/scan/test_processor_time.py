@@ -8,7 +8,7 @@ from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.runtime.scan.processor_time import ModeledExecution
+from automax_ros.runtime.scan.modeled_execution import ModeledExecution
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 Moments = list[tuple[int, str, int]]

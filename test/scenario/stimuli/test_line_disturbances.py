@@ -13,7 +13,7 @@ from rack.modeled.modeled_drives import TASK, held
 from replay.replays import edited, record, replayed
 
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.scenario.stimuli.player import StimuliPlayer

@@ -8,7 +8,7 @@ import pytest
 from rack.helpers import good
 
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.controls import MOST_CHARACTERS, SwitchOperations
+from automax_ros.rack.operator.switches import MOST_CHARACTERS, SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack

@@ -11,7 +11,7 @@ from recordings.live_racks import build
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.modules.module import QuietModule
-from automax_ros.rack.operator.controls import SwitchOperations
+from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 
 YAML = """\

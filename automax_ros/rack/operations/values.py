@@ -15,8 +15,8 @@ from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 from automax_ros.rack.base.observers import Observers, Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operate.forces import ForceTable
-from automax_ros.rack.operate.operations import Operations
+from automax_ros.rack.operations.forces import ForceTable
+from automax_ros.rack.operations.operations import Operations
 from automax_ros.rackfile.model.config import CommonElement, RackConfig
 from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER

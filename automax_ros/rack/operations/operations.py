@@ -15,7 +15,7 @@ from automax_ros.core.types import Value
 from automax_ros.rack.base.observers import Observers, Operation
 from automax_ros.rack.base.stop_cause import KEEP_STATE, OperationRefused, OperationsState, PowerReturn, StopCause
 from automax_ros.rack.modules.module import Module
-from automax_ros.rack.operate.forces import ForceTable
+from automax_ros.rack.operations.forces import ForceTable
 from automax_ros.rack.tasks.installation import Installation, PreparedReload, RackError
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.config import RackConfig

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.base.stop_cause import StopCause
-from automax_ros.rack.distributed.link import MOST_AHEAD_NS, Batch, ImageCopy, StopState
+from automax_ros.rack.distributed.image_sync import MOST_AHEAD_NS, Batch, ImageCopy, StopState
 from automax_ros.rack.distributed.versions import VersionedValue
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.time.scheduler import EventClass, EventKey

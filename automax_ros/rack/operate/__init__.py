@@ -1,1 +1,0 @@
-"""Operations on a rack: RUN, STOP, set, force, power."""

@@ -1,0 +1,1 @@
+"""What is done to a rack: RUN, STOP, set, force, power."""
