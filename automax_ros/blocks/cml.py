@@ -51,6 +51,10 @@ BETWEEN_HZ = 55.0
 """A line of this frequency or more counts as one of 60 Hz, else of 50 Hz, for REF_LAG (decision)."""
 
 
+LINE_HZ = 60
+"""AC_LINE_FREQ by default, Hz."""
+
+
 def limits_at(name: str, line_hz: float) -> tuple[float, float]:
     """Return the lowest and highest value of an input at a line frequency in Hz; REF_RATE may also be 0.0."""
     if name == "REF_RATE":
@@ -155,10 +159,6 @@ def _range(name: str, line_hz: float) -> str:
     low, high = limits_at(name, line_hz)
     zero = "0 or " if is_good(name, 0.0, line_hz) and low > 0.0 else ""
     return f"{zero}{low:g} to {high:g}"
-
-
-LINE_HZ = 60
-"""AC_LINE_FREQ by default, Hz."""
 
 
 def _input(

@@ -26,6 +26,9 @@ MAX_ARRAY_ELEMENTS = 1_000_000
 """Most elements of one array (decision: a bound on memory for untrusted sources)."""
 
 
+_DOUBLE = struct.Struct("<d")
+
+
 class DataType(enum.Enum):
     """A data type; the value is its type character."""
 
@@ -126,9 +129,6 @@ def declaration_text(name: str, dimensions: Sequence[int] = (), length: int = 0)
     maximum = f":{length}" if length not in (0, DEFAULT_STRING_LENGTH) else ""
     subscripts = f"({','.join(str(size - 1) for size in dimensions)})" if dimensions else ""
     return f"{name}{maximum}{subscripts}"
-
-
-_DOUBLE = struct.Struct("<d")
 
 
 def same_bits(one: Value, other: Value) -> bool:

@@ -34,6 +34,12 @@ _LINE_END = re.compile(r"\r\n|\r|\n")
 _TRUTH = {"true": True, "false": False}
 
 
+Node: TypeAlias = "Scalar | Sequence | Mapping"
+_Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+_WIDTH = 1 << 20
+"""No value is broken over lines."""
+
+
 class Flaw(enum.Enum):
     """Kinds of errors in a text."""
 
@@ -82,9 +88,6 @@ class Mapping:
 
     entries: tuple[tuple[Scalar, Node], ...]
     span: Span
-
-
-Node: TypeAlias = "Scalar | Sequence | Mapping"
 
 
 class _TooMuch(Exception):
@@ -260,11 +263,6 @@ class _Reader:
     def _span(self, event: yaml.Event) -> Span:
         start, end = event.start_mark, event.end_mark
         return self._places.span(start.index, end.index) if start and end else Span(1, 1, 2)
-
-
-_Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-_WIDTH = 1 << 20
-"""No value is broken over lines."""
 
 
 def yaml_of(root: Node) -> str:

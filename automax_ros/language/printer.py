@@ -69,6 +69,12 @@ _SIGN_LEVEL = max(LEVELS.values()) + 1
 _PRIMARY_LEVEL = _SIGN_LEVEL + 1
 
 
+__all__ = ["numbered", "print_expression", "print_module"]
+LINE_WIDTH = 100
+_LAST_NUMBER = 32767
+_STEP = 10
+
+
 def print_expression(expression: Expression) -> str:
     """Return an expression as text; raises ValueError for a string with both kinds of quotes."""
     if isinstance(expression, Binary):
@@ -290,13 +296,6 @@ _WAITING: dict[type[object], Callable[[Any], str]] = {
     Get: _get,
     Put: _put,
 }
-
-
-__all__ = ["numbered", "print_expression", "print_module"]
-
-LINE_WIDTH = 100
-_LAST_NUMBER = 32767
-_STEP = 10
 
 
 def print_module(module: Module) -> str:

@@ -28,6 +28,9 @@ from automax_ros.language.tree.tree import (
 )
 from automax_ros.language.tree.walk import statements_in_order, targets_of
 
+Place = tuple[int, Span]
+"""The BASIC line, and the place of the variable in the text."""
+
 
 @dataclass(frozen=True)
 class TuningLimits:
@@ -199,10 +202,6 @@ class Program:
         if self.cml is None or self.cml.block.line_scan is None:
             return 0
         return int(self.cml.facts[self.cml.block.line_scan.frequency.lower()])
-
-
-Place = tuple[int, Span]
-"""The BASIC line, and the place of the variable in the text."""
 
 
 def places_that_write(program: Program, scope: Scope = Scope.COMMON) -> dict[str, list[Place]]:

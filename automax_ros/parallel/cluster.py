@@ -34,6 +34,18 @@ _INSTALL = "install it with `pip install 'automax_ros[cluster]'`"
 _ADDRESS = "give the address that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
 
 
+_BEGUN, _ENDED = "begun", "ended"
+WITHOUT_WORKERS_S = 300
+"""How long a cluster may be without any worker, s (decision): some start workers only when there is work."""
+SAME_S = 60
+"""How long all workers together may take to report their installations, s (decision)."""
+_POLL_S = 0.1
+_LOOK_S = 2.0
+_SAME = "install the same version on all machines, and start the workers again"
+_SAME_MACHINE = "let all machines have the same Python, NumPy and C library, on processors of one kind"
+_LOGGERS = ("distributed.client", "distributed.core", "distributed.comm", "distributed.batched", "distributed.utils")
+
+
 def client_of(scheduler: str) -> Any:
     """Return a distributed.Client of a scheduler.
 
@@ -91,9 +103,6 @@ def _begin(kind: Any, scheduler: str, begun: futures.Future[Any]) -> None:
         begun.set_result(client)
 
 
-_BEGUN, _ENDED = "begun", "ended"
-
-
 @dataclass(frozen=True)
 class Refusal:
     """Why a worker has not started a piece: another installation, or a piece that was tried often enough."""
@@ -142,17 +151,6 @@ def _answer(piece: Job, worker: str) -> Answer:
     except Exception as error:
         return Answer(None, fault_of(piece.name, error, worker))
     return Answer(done.result, done.fault)
-
-
-WITHOUT_WORKERS_S = 300
-"""How long a cluster may be without any worker, s (decision): some start workers only when there is work."""
-SAME_S = 60
-"""How long all workers together may take to report their installations, s (decision)."""
-_POLL_S = 0.1
-_LOOK_S = 2.0
-_SAME = "install the same version on all machines, and start the workers again"
-_SAME_MACHINE = "let all machines have the same Python, NumPy and C library, on processors of one kind"
-_LOGGERS = ("distributed.client", "distributed.core", "distributed.comm", "distributed.batched", "distributed.utils")
 
 
 def on_cluster(

@@ -38,6 +38,10 @@ _PROGRAM = (
 """The program of a fresh interpreter: it imports only from our import path, not from its working folder."""
 
 
+_POLL_S = 0.1
+"""Seconds between two calls of ``should_stop``."""
+
+
 class Process(Protocol):
     """A process that was started."""
 
@@ -123,10 +127,6 @@ def _work_and_end(end: Connection, ours: Iterable[Connection], held: Iterable[in
         work(end)
     finally:
         os._exit(1)
-
-
-_POLL_S = 0.1
-"""Seconds between two calls of ``should_stop``."""
 
 
 def in_processes(

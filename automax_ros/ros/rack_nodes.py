@@ -71,6 +71,9 @@ _Beginning = tuple[Sequence[tuple[str, Value]], "Callable[[], None] | None"]
 _TOGETHER = "a distributed rack keeps the wall clock, by which its processes agree"
 
 
+RCLError: type[Exception] = rclpy_implementation.RCLError
+
+
 class RackNodes:
     """The nodes of one rack, and the rack itself.
 
@@ -364,9 +367,6 @@ def _loaded(path: Path, arguments: RosArguments) -> Rack:
         raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
     config = replace(result.config, namespace=arguments.placed(result.config.namespace))
     return Rack(config, stopwatch=time.monotonic_ns)
-
-
-RCLError: type[Exception] = rclpy_implementation.RCLError
 
 
 class LiveRack:

@@ -19,6 +19,16 @@ LARGEST_HISTORY = 2.0**31
 No signal comes near it, but coefficients that change continually can make such a filter grow without bound."""
 
 
+Ends = tuple[float, float]
+"""The lowest and the highest value of a parameter."""
+WM = Input("WM", DataType.REAL, "WM", "mapping frequency in rad/s, (2 pi / T) / 20 unless given", form=Form.LITERAL)
+RESET = Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False)
+SATURATED = (
+    Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
+    Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),
+)
+
+
 def default_wm(period_s: float) -> float:
     """Return the mapping frequency in rad/s where none is given: the scan frequency (2 pi / T) over 20."""
     return math.pi / (10.0 * period_s)
@@ -137,10 +147,6 @@ def evaluate_noting(
     return declared.compute(period_s, values), keep, bits
 
 
-Ends = tuple[float, float]
-"""The lowest and the highest value of a parameter."""
-
-
 def loose_bounds(
     limit: Limit, period_s: float, values: Mapping[str, float], ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[float | None, float | None]:
@@ -173,11 +179,3 @@ def bound_now(bound: Bound, scan_s: float, values: Mapping[str, float]) -> float
         return bound(scan_s, values)
     except (KeyError, ArithmeticError, ValueError):
         return None
-
-
-WM = Input("WM", DataType.REAL, "WM", "mapping frequency in rad/s, (2 pi / T) / 20 unless given", form=Form.LITERAL)
-RESET = Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False)
-SATURATED = (
-    Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
-    Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),
-)

@@ -16,6 +16,12 @@ from automax_ros.core.types import Value
 Polynomial = tuple[float, ...]
 
 
+Parameters = Mapping[str, float]
+"""The parameters of coefficients that are in force, by keyword."""
+Inputs = Mapping[str, Value]
+"""The values of inputs, by keyword."""
+
+
 @dataclass(frozen=True)
 class Transfer:
     """A transfer function as the manual prints it, and as it runs at a scan period.
@@ -89,12 +95,6 @@ def _value(polynomial: Sequence[float], at: complex) -> complex:
     for factor in polynomial:
         total = total * at + factor
     return total
-
-
-Parameters = Mapping[str, float]
-"""The parameters of coefficients that are in force, by keyword."""
-Inputs = Mapping[str, Value]
-"""The values of inputs, by keyword."""
 
 
 @dataclass(frozen=True)

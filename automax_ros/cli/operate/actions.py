@@ -32,6 +32,10 @@ STATE = "state"
 _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 
 
+_MOST_STEPS = 1_000_000
+DEFAULT_TIMEOUT_S = "5"
+
+
 def _add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("transition", choices=(*_TRANSITIONS, STATE), help="what is asked for; state reads the state")
     parser.add_argument(
@@ -63,9 +67,6 @@ LIFECYCLE = Action(
     lambda state: [state],
     by_operator=False,
 )
-
-
-_MOST_STEPS = 1_000_000
 
 
 def _tasks(parser: argparse.ArgumentParser) -> None:
@@ -296,9 +297,6 @@ ACTIONS: Mapping[str, Action] = {
     "lifecycle": LIFECYCLE,
 }
 """The actions by name."""
-
-
-DEFAULT_TIMEOUT_S = "5"
 
 
 class ActionParser(argparse.ArgumentParser):

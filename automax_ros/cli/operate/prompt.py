@@ -17,6 +17,9 @@ _QUIT = ("quit", "exit")
 _HELP = "help"
 
 
+_STATUS = ServiceCall("status", "automax_msgs/ReadStatus", {"home_only": True})
+
+
 def run_shell(arguments: argparse.Namespace) -> int:
     """Carry out lines of standard input until its end or ``quit``; 1 where a line of a script failed.
 
@@ -34,9 +37,6 @@ def run_shell(arguments: argparse.Namespace) -> int:
         lines: Iterable[str] = typed_lines(f"{arguments.rack}> ", interrupt) if interactive else sys.stdin
         failed = shell.obey_all(lines)
     return int(failed and not interactive)
-
-
-_STATUS = ServiceCall("status", "automax_msgs/ReadStatus", {"home_only": True})
 
 
 class _Shell:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 _T = TypeVar("_T", int, float)
 
 
+_COMMA = re.compile(r",(?![^(\[]*[)\]])")
+"""A comma that is not between subscripts."""
+
+
 def number(text: str) -> float:
     """Return an argument's decimal number, for ``type=``."""
     return _argument(values.number, text)
@@ -93,10 +97,6 @@ def seconds_above_0(text: str) -> int:
     if not found:
         raise argparse.ArgumentTypeError(f"{text} s is too short: give more")
     return found
-
-
-_COMMA = re.compile(r",(?![^(\[]*[)\]])")
-"""A comma that is not between subscripts."""
 
 
 def add_watch_argument(parser: argparse.ArgumentParser, default: str) -> None:

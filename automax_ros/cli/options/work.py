@@ -17,6 +17,10 @@ MOST_JOBS = 1024
 """Most processes that are started in parallel (decision: a slip of the finger shall not bring a machine down)."""
 
 
+_LIVE_LIMIT_S = 20.0
+"""Longest time that the start of a rack on the wall clock waits for the build of one task, s (decision)."""
+
+
 def add_where_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     """Add ``--jobs`` and ``--scheduler``; ``what`` is done in parallel."""
     parser.add_argument(
@@ -56,10 +60,6 @@ def _jobs(text: str) -> int | str:
     if not 1 <= found <= MOST_JOBS:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to {MOST_JOBS}, or {_AUTO}")
     return found
-
-
-_LIVE_LIMIT_S = 20.0
-"""Longest time that the start of a rack on the wall clock waits for the build of one task, s (decision)."""
 
 
 def add_native_arguments(parser: argparse.ArgumentParser) -> None:

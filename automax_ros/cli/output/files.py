@@ -13,6 +13,8 @@ from typing import Any, TextIO
 from automax_ros.core.user_error import UsageError
 from automax_ros.recordings.mcap.whole_file import atomic_write, held_open, is_direct, open_at_once
 
+PICTURE_FORMATS = (".png", ".svg", ".pdf")
+
 
 @contextmanager
 def opened_for_writing(path: Path | None) -> Iterator[TextIO]:
@@ -108,9 +110,6 @@ def write_text(path: Path, text: str) -> None:
 
 def _unwritable(path: Path, error: Exception) -> UsageError:
     return UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}")
-
-
-PICTURE_FORMATS = (".png", ".svg", ".pdf")
 
 
 def require_picture_file(path: Path) -> None:

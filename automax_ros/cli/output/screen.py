@@ -22,6 +22,14 @@ _COLOURS = {Severity.ERROR: "1;31", Severity.WARNING: "1;33"}
 _HINT = "  hint:"
 
 
+_TERMINAL_PERIOD_NS = NS_PER_S // 5
+_PLAIN_PERIOD_NS = 5 * NS_PER_S
+_PATIENCE_S = 2.0
+_PERIOD_S = 0.1
+_WIDTH = 30
+_SHARES = 1000
+
+
 def wants_colour(stream: TextIO) -> bool:
     """Whether a stream is a terminal that shows colours, and NO_COLOR is not set."""
     return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
@@ -66,10 +74,6 @@ def _painted(item: Diagnostic, text: str) -> str:
         before, _, after = text.rpartition(_HINT)
         text = before + painted(_HINT, "36") + after
     return text
-
-
-_TERMINAL_PERIOD_NS = NS_PER_S // 5
-_PLAIN_PERIOD_NS = 5 * NS_PER_S
 
 
 class StatusLine:
@@ -128,12 +132,6 @@ def fitting(parts: Sequence[str], width: int) -> str:
             break
         line += f"  {part}"
     return line
-
-
-_PATIENCE_S = 2.0
-_PERIOD_S = 0.1
-_WIDTH = 30
-_SHARES = 1000
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):

@@ -24,6 +24,10 @@ AROUND = 3
 _NUMBER = re.compile(r"\s*([0-9]{1,9})\b")
 
 
+MOST_STEPS = 1_000_000
+_DEFAULT_GO_NS = 1 << 62
+
+
 def place_text(rack: Rack, task: str, line: int) -> str:
     """Return the position of a rack: its time, and the line before which a scan is held."""
     place = f", {task} before line {line}" if task else ""
@@ -67,10 +71,6 @@ def source_lines(text: Sequence[str], line: int, around: int = AROUND) -> list[s
         f"{'->' if line and numbers[index] == line else '  '} {printable(text[index])}"
         for index in range(first, min(last, len(text)))
     ]
-
-
-MOST_STEPS = 1_000_000
-_DEFAULT_GO_NS = 1 << 62
 
 
 class CommandFault(UserError):

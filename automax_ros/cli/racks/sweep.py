@@ -40,6 +40,12 @@ from automax_ros.sweep.run import Plan, Stimuli, run_point
 from automax_ros.sweep.sweeping import Row, run_sweep
 from automax_ros.sweep.tables import records
 
+_T = TypeVar("_T")
+USUAL_DURATION_NS = 10 * NS_PER_S
+"""Duration of a run without ``--duration`` (decision)."""
+_FEW = 16
+"""Fewer runs than this are done by this process alone unless ``--jobs`` is given (decision: they end as soon)."""
+
 
 def record_run(plan: Plan, point: Point, folder: Path, should_stop: Callable[[], bool]) -> list[Row]:
     """Run a point, record it into a new folder, and return its row, the same as without recording.
@@ -65,13 +71,6 @@ def record_run(plan: Plan, point: Point, folder: Path, should_stop: Callable[[],
 
     outcome = run_point(plan, point, attend, should_stop)
     return [] if should_stop() else [Row(1, point, outcome)]
-
-
-_T = TypeVar("_T")
-USUAL_DURATION_NS = 10 * NS_PER_S
-"""Duration of a run without ``--duration`` (decision)."""
-_FEW = 16
-"""Fewer runs than this are done by this process alone unless ``--jobs`` is given (decision: they end as soon)."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -31,6 +31,14 @@ _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """Nothing is loaded and no script runs, whatever a recording has in its names."""
 
 
+_ENERGIES = {
+    "line_j": "from the line",
+    "loss_j": "lost as heat",
+    "stored_j": "stored in inductances",
+    "shaft_j": "to the shaft",
+}
+
+
 def document(title: str, subtitle: str, parts: Sequence[str]) -> str:
     """Return a page of a title, a line below it, and parts that are HTML already."""
     head = [
@@ -90,14 +98,6 @@ def rows(
 def plain(text: str) -> str:
     """Return a text escaped for HTML."""
     return escape(printable(text), quote=True)
-
-
-_ENERGIES = {
-    "line_j": "from the line",
-    "loss_j": "lost as heat",
-    "stored_j": "stored in inductances",
-    "shaft_j": "to the shaft",
-}
 
 
 def page(report: DriveReport, recording: str, pictures: Mapping[str, bytes]) -> str:

@@ -19,6 +19,10 @@ SYNC_PERIOD_S = 0.4
 """Pause between two syncs to the disk, so that a power failure, too, loses only about a second."""
 
 
+SAVE_PERIOD_NS = 5 * NS_PER_S
+"""Period at which a changed state is saved while the rack runs, so that a killed run loses little (decision)."""
+
+
 class RecordingMonitor:
     """Reports a recording that ends before its rack; without a recorder it does nothing."""
 
@@ -63,10 +67,6 @@ class DiskSync:
     def _run(self) -> None:
         while not self._ended.wait(SYNC_PERIOD_S):
             self._sync()
-
-
-SAVE_PERIOD_NS = 5 * NS_PER_S
-"""Period at which a changed state is saved while the rack runs, so that a killed run loses little (decision)."""
 
 
 class SavedState:

@@ -24,6 +24,15 @@ WINDOW_NS = 10 * NS_PER_S
 """Time within which deaths are counted together (decision)."""
 
 
+_LOOK_S = 0.05
+STAGE_NS = 800 * NS_PER_MS
+"""Time that the processes of a stage have to end before those of the next are asked to; all end within 2 s."""
+END_NS = 10 * NS_PER_S
+"""A process that has not exited this long after SIGTERM is killed."""
+GRACE_NS = 2 * NS_PER_S
+"""Time that the other processes have to end by themselves after the first one has."""
+
+
 class Restarts:
     """The deaths of one process; times are ns of any one clock.
 
@@ -45,15 +54,6 @@ class Restarts:
         recent = sum(now_ns - died_ns < WINDOW_NS for died_ns in self._recent)
         self.given_up = recent >= MOST_DEATHS
         return None if self.given_up else now_ns + BACKOFFS_NS[recent - 1]
-
-
-_LOOK_S = 0.05
-STAGE_NS = 800 * NS_PER_MS
-"""Time that the processes of a stage have to end before those of the next are asked to; all end within 2 s."""
-END_NS = 10 * NS_PER_S
-"""A process that has not exited this long after SIGTERM is killed."""
-GRACE_NS = 2 * NS_PER_S
-"""Time that the other processes have to end by themselves after the first one has."""
 
 
 @dataclass(frozen=True)

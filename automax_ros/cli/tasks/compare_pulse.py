@@ -29,6 +29,17 @@ from automax_ros.core.values import value_of, wanted, whole_number
 from automax_ros.logix.pmul import GAIN_ONE
 from automax_ros.logix.pulse_comparison import DEFAULT_MULTIPLIER, Pair, PulseComparison, PulseParameters
 
+_ROWS_A_LOOK = 256
+"""Rows between two updates of the progress bar."""
+_MOST_NAMES = 12
+"""Most column names in one message."""
+_MOST_GUESSES = 1000
+"""Most column names that are searched for a similar one (decision: a header may have half a million)."""
+_HEADER = (
+    "scan", "feedback", "reset", "pulse_mult", "pmul", "difference",
+    "pulse_mult_total", "pmul_total", "total_difference",
+)  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Report:
@@ -144,18 +155,6 @@ def _table(rows: list[tuple[str, Pair]]) -> list[str]:
         for words, pair in rows
     ]
     return table(cells, right=range(1, 5))
-
-
-_ROWS_A_LOOK = 256
-"""Rows between two updates of the progress bar."""
-_MOST_NAMES = 12
-"""Most column names in one message."""
-_MOST_GUESSES = 1000
-"""Most column names that are searched for a similar one (decision: a header may have half a million)."""
-_HEADER = (
-    "scan", "feedback", "reset", "pulse_mult", "pmul", "difference",
-    "pulse_mult_total", "pmul_total", "total_difference",
-)  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

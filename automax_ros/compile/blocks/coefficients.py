@@ -28,6 +28,10 @@ that a person changes never comes so far, a gain that follows a signal does with
 Computed = Callable[..., tuple[float, ...]]
 
 
+_Known = dict[str, object]
+"""The number of each parameter, or the name that holds it."""
+
+
 @dataclass(eq=False)
 class CoefficientFunction:
     """Computes a block's coefficients from evaluated parameters and the values kept from the last call.
@@ -63,10 +67,6 @@ class CoefficientFunction:
 def kept_names(declared: Coefficients) -> list[str]:
     """Return the names of the states that hold the last values that met the relation of coefficients."""
     return [] if declared.relation is None else [f"kept_{name.lower()}" for name in declared.relation.parameters]
-
-
-_Known = dict[str, object]
-"""The number of each parameter, or the name that holds it."""
 
 
 def coefficient_tree(function: CoefficientFunction) -> ast.FunctionDef:

@@ -24,6 +24,13 @@ MOST_ROUNDS = 8
 """Rounds of propagation; step functions need two or three."""
 
 
+_WRITES, _ERROR = "writes", "error"
+"""Keys among the results, whose other keys are keywords in upper case."""
+_Pairs = tuple[tuple[str, str], ...]
+_PREFIX = "_p_"
+_Node = TypeVar("_Node", bound=ast.AST)
+
+
 def carry_on(
     body: list[ast.stmt], outputs: Mapping[str, ast.expr], own: frozenset[str]
 ) -> tuple[list[ast.stmt], dict[str, ast.expr]]:
@@ -124,10 +131,6 @@ def _logging(body: list[ast.stmt], name: str, log: Callable[[ast.expr], ast.stmt
         else:
             kept.append(statement)
     return kept
-
-
-_WRITES, _ERROR = "writes", "error"
-"""Keys among the results, whose other keys are keywords in upper case."""
 
 
 @dataclass(frozen=True)
@@ -250,10 +253,6 @@ def inline(block: Block, binding: Binding, wanted: Mapping[str, str], free: froz
     return stand_ins.replaced(_inlined_shape(*shape), binding.prefix)
 
 
-_Pairs = tuple[tuple[str, str], ...]
-_PREFIX = "_p_"
-
-
 class _StandIns:
     """Placeholders for the names of one CALL, numbered in their order: calls of one shape are inlined only once."""
 
@@ -283,9 +282,6 @@ class _StandIns:
             _renamed(inlined.writes, name_of),
             None if inlined.error is None else _renamed(inlined.error, name_of),
         )
-
-
-_Node = TypeVar("_Node", bound=ast.AST)
 
 
 def _renamed(node: _Node, name_of: Callable[[str], str]) -> _Node:

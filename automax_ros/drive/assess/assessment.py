@@ -41,6 +41,11 @@ MOST_DELAY = 0.7
 (decision)."""
 
 
+Rule = Callable[[DriveCase], Finding]
+PMI_RULES: tuple[Rule, ...] = (pmi_overcurrent,)
+"""The rules for a drive of a UDC, whose loop is in its power module's interface."""
+
+
 def _kp(circuit: Circuit) -> tuple[float, str]:
     gain = gain_continuous(circuit)
     ideal, millihenry = VD0 * circuit.line_v, circuit.inductance_h * 1e3
@@ -139,7 +144,6 @@ GAIN_RULES: tuple[Callable[[DriveCase], Finding], ...] = (
 """The rule for the computing delay, and a rule for each gain."""
 
 
-Rule = Callable[[DriveCase], Finding]
 LOOP_RULES: tuple[Rule, ...] = (
     line_frequency,
     line_synchronization,
@@ -150,8 +154,6 @@ LOOP_RULES: tuple[Rule, ...] = (
     *GAIN_RULES,
 )
 """The rules for a drive with a 57C406 and a loop in a task, in the order in which they are reported."""
-PMI_RULES: tuple[Rule, ...] = (pmi_overcurrent,)
-"""The rules for a drive of a UDC, whose loop is in its power module's interface."""
 
 
 def assess(case: DriveCase | Unjudged) -> DriveFindings:

@@ -18,6 +18,34 @@ from automax_ros.blocks.cml import ioc_is_possible, is_good
 from automax_ros.drive.base.state import Stateful
 from automax_ros.drive.current_loop.pll import LONGEST_NS, SHORTEST_NS
 
+TICK_NS: Final = 5_500_000
+"""The system clock tick, ns."""
+FAST_CHANGE: Final = 1
+DIERIKON: Final = 2
+"""Bits of register 4146: fast bridge change (52.6.2), the SCR test of both bridges (52.7)."""
+BAD_DYNAMIC: Final = 7105
+BAD_FIXED: Final = 7106
+BAD_LEVEL: Final = 7107
+"""Problems: a dynamic input out of range, a fixed one out of range, IOC_THRESH of 1.8 LIM_BAR or more."""
+BAD_RATIO: Final = 7117
+"""Problem: the phase change of the PLL is not twice its period change (52.5.1)."""
+_LIMITED: Final = (
+    "ac_line_freq",
+    "ref_lag",
+    "pi_w_lead",
+    "ag_factor",
+    "max_m_dropout",
+    "ioc_thresh",
+    "lim_bar",
+    "osv_thresh",
+)
+_SWITCHES: Final = ("digital_tach", "tach_loss_stop", "auto_phrot")
+_DYNAMIC: Final = ("cc_thresh", "ref_rate", "kp", "test_alpha")
+_SEEN: Final = 1 << len(_DYNAMIC)
+_TOLD: Final = _SEEN << 1
+"""Bits after those of the dynamic inputs: registers of another ratio were read at the last tick; they were logged."""
+_INPUTS: Final = _SEEN - 1
+
 
 class Inputs(NamedTuple):
     """Values of one scan: latched variables, literals, and the defaults of table 1.
@@ -56,37 +84,6 @@ class Inputs(NamedTuple):
 
 
 INPUTS: Final = tuple(name.upper() for name in Inputs._fields)
-
-
-TICK_NS: Final = 5_500_000
-"""The system clock tick, ns."""
-FAST_CHANGE: Final = 1
-DIERIKON: Final = 2
-"""Bits of register 4146: fast bridge change (52.6.2), the SCR test of both bridges (52.7)."""
-
-BAD_DYNAMIC: Final = 7105
-BAD_FIXED: Final = 7106
-BAD_LEVEL: Final = 7107
-"""Problems: a dynamic input out of range, a fixed one out of range, IOC_THRESH of 1.8 LIM_BAR or more."""
-BAD_RATIO: Final = 7117
-"""Problem: the phase change of the PLL is not twice its period change (52.5.1)."""
-
-_LIMITED: Final = (
-    "ac_line_freq",
-    "ref_lag",
-    "pi_w_lead",
-    "ag_factor",
-    "max_m_dropout",
-    "ioc_thresh",
-    "lim_bar",
-    "osv_thresh",
-)
-_SWITCHES: Final = ("digital_tach", "tach_loss_stop", "auto_phrot")
-_DYNAMIC: Final = ("cc_thresh", "ref_rate", "kp", "test_alpha")
-_SEEN: Final = 1 << len(_DYNAMIC)
-_TOLD: Final = _SEEN << 1
-"""Bits after those of the dynamic inputs: registers of another ratio were read at the last tick; they were logged."""
-_INPUTS: Final = _SEEN - 1
 
 
 @lru_cache(maxsize=64)

@@ -16,6 +16,17 @@ from typing import Final
 from automax_ros.drive.base.state import Stateful
 from automax_ros.drive.current_loop.signals import Pulse
 
+RECORDS: Final = 12
+"""Records of a page (52.3.2)."""
+ROWS: Final = 38
+PAGES: Final = 2
+SIZE: Final = ROWS * PAGES
+"""Elements of the array."""
+PAGE_NUMBER: Final = 0
+"""Index of the element that selects the page to write: 0 is page 0, any other value page 1."""
+Record = tuple[int, int, int]
+"""I_FDBK, REF_LAG_OUT and the gates to be pulsed for the feedback of the next scan."""
+
 
 @dataclass
 class Outputs(Stateful):
@@ -53,19 +64,6 @@ _NAMES: Final = tuple(item.name for item in fields(Outputs))
 _row = attrgetter(*_NAMES)
 OUTPUTS: Final = tuple(name.upper() for name in _NAMES)
 Outputs._kept = _NAMES
-
-
-RECORDS: Final = 12
-"""Records of a page (52.3.2)."""
-ROWS: Final = 38
-PAGES: Final = 2
-SIZE: Final = ROWS * PAGES
-"""Elements of the array."""
-PAGE_NUMBER: Final = 0
-"""Index of the element that selects the page to write: 0 is page 0, any other value page 1."""
-
-Record = tuple[int, int, int]
-"""I_FDBK, REF_LAG_OUT and the gates to be pulsed for the feedback of the next scan."""
 
 
 def page_of(page_number: int) -> int:

@@ -19,6 +19,13 @@ LONGEST_SLICE_NS = 1_000_000
 """The circuits exchange torque at least this often, ns."""
 
 
+DAMPING_RATIO = 0.05
+"""Damping over the critical one of a coupling without damping of its own (decision: steel shafts and couplings)."""
+FASTEST_SWING = 1000.0
+"""Fastest swing of a coupling, rad/s (decision: the circuits exchange torque at least every 50 us; what is quicker is a
+stiff shaft to every controller of a drive)."""
+
+
 class Coupling(Stateful):
     """Advances two circuits together, in slices after which their motors exchange torque.
 
@@ -140,13 +147,6 @@ def _motor(circuit: Circuit) -> Motor:
     if not isinstance(circuit.machine, Motor):
         raise ParameterError("only circuits that feed a Motor can be coupled")
     return circuit.machine
-
-
-DAMPING_RATIO = 0.05
-"""Damping over the critical one of a coupling without damping of its own (decision: steel shafts and couplings)."""
-FASTEST_SWING = 1000.0
-"""Fastest swing of a coupling, rad/s (decision: the circuits exchange torque at least every 50 us; what is quicker is a
-stiff shaft to every controller of a drive)."""
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,23 @@ Numbers = tuple[float, ...]
 Range = tuple[float, float]
 
 
+LONGEST_SAG_S = 3600.0
+"""Longest time that a sag can be given, s (decision)."""
+SAG, HERTZ, LOAD, NOTCHES, NOISE, HARMONIC = (
+    "line_sag", "line_hz", "generator_load", "line_notches", "line_noise", "line_harmonic",
+)  # fmt: skip
+_USUAL_LOAD = (0.1, 1.0)
+_USUAL_NOTCHES = (300.0, 6.0, -4.0)
+_TERMINALS = {"T1": 0, "1": 0, "C": 0, "T2": 1, "2": 1, "B": 1, "T3": 2, "3": 2, "A": 2}
+"""Terminals of the drive, and the line's phases that they carry (decision: see ``PlantData.standard_rotation``)."""
+_SCRS = {str(number): number for number in sorted(BIT)}
+_YES = {"TRUE": 1}
+_ALL = {"ALL": 1}
+_SCR = "1 to 6 or 11 to 16"
+_PHASE = "1, 2, 3 (the terminals T1, T2, T3) or A, B, C (the line's phases)"
+_TORQUE = (-LARGEST, LARGEST)
+
+
 @dataclass(frozen=True)
 class PlantVerb:
     """The values and the action of a verb.
@@ -93,13 +110,6 @@ def note(plant: DrivePlant, text: str) -> None:
 def forget(plant: DrivePlant, verb: str) -> None:
     """Remove the faults of a verb from the plant's notes."""
     plant.notes = [text for text in plant.notes if text.split(maxsplit=1)[0] != verb]
-
-
-LONGEST_SAG_S = 3600.0
-"""Longest time that a sag can be given, s (decision)."""
-SAG, HERTZ, LOAD, NOTCHES, NOISE, HARMONIC = (
-    "line_sag", "line_hz", "generator_load", "line_notches", "line_noise", "line_harmonic",
-)  # fmt: skip
 
 
 def is_over(plant: DrivePlant, text: str) -> bool:
@@ -206,8 +216,6 @@ def _disturbed(plant: DrivePlant, verb: str, values: Numbers) -> None:
         note(plant, " ".join([verb, *(f"{value:g}" for value in values)]))
 
 
-_USUAL_LOAD = (0.1, 1.0)
-_USUAL_NOTCHES = (300.0, 6.0, -4.0)
 LINE_VERBS: Mapping[str, PlantVerb] = {
     SAG: PlantVerb(
         "percent of the line's voltage, 0 to 100, and for how many seconds (without them until it is repaired)",
@@ -257,13 +265,6 @@ LINE_VERBS: Mapping[str, PlantVerb] = {
     ),
 }
 """The verbs on a plant's line, by name."""
-
-
-_TERMINALS = {"T1": 0, "1": 0, "C": 0, "T2": 1, "2": 1, "B": 1, "T3": 2, "3": 2, "A": 2}
-"""Terminals of the drive, and the line's phases that they carry (decision: see ``PlantData.standard_rotation``)."""
-_SCRS = {str(number): number for number in sorted(BIT)}
-_YES = {"TRUE": 1}
-_ALL = {"ALL": 1}
 
 
 def values_of(verb: str, text: str) -> Numbers:
@@ -353,9 +354,6 @@ def _repair(plant: DrivePlant, _: Numbers) -> None:
     plant.notes.clear()
 
 
-_SCR = "1 to 6 or 11 to 16"
-_PHASE = "1, 2, 3 (the terminals T1, T2, T3) or A, B, C (the line's phases)"
-_TORQUE = (-LARGEST, LARGEST)
 VERBS: Mapping[str, PlantVerb] = {
     "short_scr": PlantVerb(_SCR, one_of(_SCRS), _short_scr),
     "open_gate": PlantVerb(_SCR, one_of(_SCRS), _open_gate),

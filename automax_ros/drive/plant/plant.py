@@ -22,6 +22,20 @@ from automax_ros.drive.circuit.circuit import Circuit
 from automax_ros.drive.circuit.meter import EnergyMeter, Sample
 from automax_ros.drive.plant.sync_signal import SyncSignal
 
+_Sums = tuple[float, float, float, float]
+PICK_UP_NS: Final = 25_000_000
+DROP_OUT_NS: Final = 20_000_000
+"""From the relay to closed and to open contacts of the M-contactor, ns (decision: of the 180 ms from a start to the run
+that 52.3.1 tells of, the shorted SCR test leaves it 30)."""
+SCR_DROP_V: Final = 1.5
+"""Voltage over a conducting SCR, V (decision: 1.2 to 1.6 V are usual)."""
+FIELD_TAU_S: Final = 0.5
+FIELD_KNEE: Final = 0.5
+"""Time constant of the field (s) and knee of its saturation (decision: 0.2 to 3 s by size and 0.5 are usual)."""
+FIELD_AMPS: Final = 0.015
+"""Rated field current over rated armature current (decision: a field of 1 to 2 % of the power is usual)."""
+RAD_S_PER_RPM: Final = pi / 30
+
 
 @dataclass(frozen=True)
 class Means:
@@ -69,25 +83,8 @@ class PlantMeter:
         return Means(duration, charge / duration, sqrt(max(square, 0.0) / duration), volt_s / duration)
 
 
-_Sums = tuple[float, float, float, float]
-
-
 def _sums(sample: Sample) -> _Sums:
     return sample.duration_s, sample.charge_c, sample.square_a2s, sample.volt_s
-
-
-PICK_UP_NS: Final = 25_000_000
-DROP_OUT_NS: Final = 20_000_000
-"""From the relay to closed and to open contacts of the M-contactor, ns (decision: of the 180 ms from a start to the run
-that 52.3.1 tells of, the shorted SCR test leaves it 30)."""
-SCR_DROP_V: Final = 1.5
-"""Voltage over a conducting SCR, V (decision: 1.2 to 1.6 V are usual)."""
-FIELD_TAU_S: Final = 0.5
-FIELD_KNEE: Final = 0.5
-"""Time constant of the field (s) and knee of its saturation (decision: 0.2 to 3 s by size and 0.5 are usual)."""
-FIELD_AMPS: Final = 0.015
-"""Rated field current over rated armature current (decision: a field of 1 to 2 % of the power is usual)."""
-RAD_S_PER_RPM: Final = pi / 30
 
 
 @dataclass(frozen=True)

@@ -12,26 +12,15 @@ DRIVE_B = 1000
 """Offset of a number for drive B."""
 
 
-@dataclass(frozen=True)
-class PmiRegister:
-    """A register: its number for drive A, its content, and the meaning of each bit of a word of bits."""
-
-    number: int
-    meaning: str
-    bits: tuple[tuple[int, str], ...] = ()
-
-
 LINK, MESSAGES = 80, 81
 CONTROL, REFERENCE, ALPHA = 100, 101, 102
 STATUS, INPUTS, FAULTS, WARNINGS = 200, 201, 202, 203
 SPEED, POSITION, VOLTAGE, CURRENT, VOLTS, DELTA, DC_TIME = 204, 205, 206, 207, 208, 209, 210
 LINE_PERIOD, BAD_SCR_NUM, REF_LAG_OUT = 212, 213, 214
-
 NO_CLOCK = 1 << 0
 """Bit of ``LINK``: there is no common clock, nothing is exchanged."""
 LAST_MESSAGE = 32_000
 """Value at which the count of messages rolls over to 0."""
-
 (RUN, TEST, COAST, REVERSE_CONTACTOR, TEST_BRIDGE_2, FAST_CHANGE, ANY_ROTATION) = (1 << bit for bit in range(7))
 FAULT_RESET, COUNTER_RESET = 1 << 8, 1 << 9
 """Bits of ``CONTROL``."""
@@ -45,13 +34,22 @@ UDC_RUN, COMMUNICATION = 1 << 14, 1 << 15
 """Bits of ``FAULTS``."""
 (NOT_PERMITTED, REFUSED, REFERENCE_LIMITED) = (1 << bit for bit in range(3))
 """Bits of ``WARNINGS``."""
-
 FULL = 4095
 """Counts of current at the Motor Overload Ratio, and of speed at the motor's base speed."""
 RATED_VOLTAGE = 3000
 """Counts of the rated armature voltage: the scaling of TACHLOSS_OVERSPEED (35)."""
 TURN = 4096
 """Counts of a turn of the resolver."""
+
+
+@dataclass(frozen=True)
+class PmiRegister:
+    """A register: its number for drive A, its content, and the meaning of each bit of a word of bits."""
+
+    number: int
+    meaning: str
+    bits: tuple[tuple[int, str], ...] = ()
+
 
 COMMAND_REGISTERS = (
     PmiRegister(

@@ -10,6 +10,15 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
 from automax_ros.language.tree.expression_tree import Expression, Target, span_field
 
+ITEM_TYPES = {
+    "I": DataType.INTEGER,
+    "D": DataType.DOUBLE,
+    "R": DataType.REAL,
+    "S": DataType.STRING,
+    "B": DataType.BOOLEAN,
+}
+"""The letters of TYPE (J-3675 p. 6-20)."""
+
 
 class Unit(enum.Enum):
     """A unit of DELAY and START EVERY, always plural (J-3675 p. 6-22)."""
@@ -30,16 +39,6 @@ class Direction(enum.Enum):
 
     INPUT = "INPUT"
     OUTPUT = "OUTPUT"
-
-
-ITEM_TYPES = {
-    "I": DataType.INTEGER,
-    "D": DataType.DOUBLE,
-    "R": DataType.REAL,
-    "S": DataType.STRING,
-    "B": DataType.BOOLEAN,
-}
-"""The letters of TYPE (J-3675 p. 6-20)."""
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,10 @@ INSTALLED_NS = -1
 """The time of values that a rack has at its installation."""
 
 
+BUS = QosProfile("reliable", "volatile", "keep_last", 1000)
+"""Writes and images between processes: every message counts."""
+
+
 class BusLimits:
     """Checks messages. ``seats`` are the slots of all processes of the rack, by the slot that names each."""
 
@@ -84,10 +88,6 @@ class BusLimits:
 
     def _are_seats(self, seats: Iterable[int]) -> bool:
         return self._slots.issuperset(seats)
-
-
-BUS = QosProfile("reliable", "volatile", "keep_last", 1000)
-"""Writes and images between processes: every message counts."""
 
 
 def write_message(batch: Batch, run_id: int, process: int) -> BusWrite:

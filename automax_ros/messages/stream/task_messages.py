@@ -39,6 +39,23 @@ _PLAIN: Final = (1 << 62) - 1
 """Up to this number a comparison takes one step in compiled code."""
 
 
+_new = tuple.__new__
+"""Makes a message from a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
+_MOST: Final = 0xFFFFFFFF
+"""The greatest uint32."""
+_HEAD = ("scan", "duration_ns", "skipped")
+_VALUES = (("latched.value",), ("committed.value",))
+_ENTRIES = (
+    ("latched.variable",), ("latched.value",),
+    ("read.variable",), ("read.element",), ("read.value",),
+    ("written.variable",), ("written.element",), ("written.value",),
+    ("committed.variable",), ("committed.value",),
+)  # fmt: skip
+"""The fields that vary if only the numbers of entries recur."""
+_Columns = tuple[tuple[int, ...], tuple[int, ...], tuple[Value, ...]]
+_NO_ENTRIES: _Columns = ((), (), ())
+
+
 def as_i16(number: int) -> int:
     """Return the int16 with the bits of a uint16."""
     return number if 0 <= number < 1 << 15 else _wrapped(number, 16)
@@ -58,23 +75,6 @@ def _wrapped(number: int, bits: int) -> int:
     if not 0 <= number < 1 << bits:
         raise OverflowError(f"{number} does not fit an unsigned number of {bits} bits")
     return number - (1 << bits) if number >> (bits - 1) else number
-
-
-_new = tuple.__new__
-"""Makes a message from a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
-_MOST: Final = 0xFFFFFFFF
-"""The greatest uint32."""
-_HEAD = ("scan", "duration_ns", "skipped")
-_VALUES = (("latched.value",), ("committed.value",))
-_ENTRIES = (
-    ("latched.variable",), ("latched.value",),
-    ("read.variable",), ("read.element",), ("read.value",),
-    ("written.variable",), ("written.element",), ("written.value",),
-    ("committed.variable",), ("committed.value",),
-)  # fmt: skip
-"""The fields that vary if only the numbers of entries recur."""
-_Columns = tuple[tuple[int, ...], tuple[int, ...], tuple[Value, ...]]
-_NO_ENTRIES: _Columns = ((), (), ())
 
 
 class TaskMessages:

@@ -20,6 +20,11 @@ from automax_ros.messages.cdr.parts import CODES, HEADER, size_of
 from automax_ros.messages.types.definitions import TIME, Field, message_types
 from automax_ros.messages.types.messages import NAMES
 
+ENOUGH_TIMES = 8
+"""How often the codec packs messages of one pattern before a template is prepared for them."""
+MOST_PATTERNS = 2048
+"""Most patterns that are known at a time: an array's elements in turn would make more and more."""
+
 
 class MessageTemplate:
     """Packs messages that differ from one only in some fields.
@@ -144,12 +149,6 @@ def prepared(message: Message, *groups: Sequence[str]) -> MessageTemplate:
     if len(made.constants) != len(groups) + 1:
         raise ValueError(f"{name} has not all of {groups}")
     return made
-
-
-ENOUGH_TIMES = 8
-"""How often the codec packs messages of one pattern before a template is prepared for them."""
-MOST_PATTERNS = 2048
-"""Most patterns that are known at a time: an array's elements in turn would make more and more."""
 
 
 class TemplateCache:

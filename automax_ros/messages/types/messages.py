@@ -16,6 +16,11 @@ from typing import NamedTuple
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import Value
 
+_new = tuple.__new__
+"""Makes a message from a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
+HELD_MARK = "forced "
+"""Prefix of the fields without values that come first in a TaskState: the names of the locals that a force holds."""
+
 
 class Values(NamedTuple):
     """Values of common variables: entry i is ``element[i]`` of ``variable[i]``."""
@@ -28,8 +33,6 @@ class Values(NamedTuple):
 
 NO_VALUES = Values()
 """The one empty Values: most messages of a recording contain it, and the codec recognises it by its identity."""
-_new = tuple.__new__
-"""Makes a message from a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
 
 
 def values_of(entries: Sequence[tuple[int, int, Value]]) -> Values:
@@ -403,8 +406,6 @@ class UInt8MultiArray(NamedTuple):
     data: Sequence[int] = ()
 
 
-HELD_MARK = "forced "
-"""Prefix of the fields without values that come first in a TaskState: the names of the locals that a force holds."""
 _OWN = (
     BusImage,
     BusWrite,

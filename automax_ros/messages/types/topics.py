@@ -9,6 +9,10 @@ _INFINITE = {"sec": 9223372036, "nsec": 854775807}
 """The infinite duration, as ROS 2 writes it."""
 
 
+Take = Callable[[int, bytes], None]
+"""Receives a message of one topic: its stamp in ns, its CDR bytes."""
+
+
 @dataclass(frozen=True)
 class QosProfile:
     """The four policies that our topics set; the others keep their defaults."""
@@ -62,8 +66,6 @@ class Topic:
     plant: str = ""
 
 
-Take = Callable[[int, bytes], None]
-"""Receives a message of one topic: its stamp in ns, its CDR bytes."""
 Sink = Callable[[Topic], Take | None]
 """Called once for each topic; returns the function that receives its messages, None if there is none."""
 Takes = dict[Topic, Take]

@@ -53,6 +53,20 @@ LATE_NS = 1_000_000
 """An interrupt later than this counts as late, ns."""
 
 
+PRESSED_NS = 500_000_000
+"""Time for which the fault reset switch is pressed, ns (decision)."""
+TEST_SWITCH, FAULT_RESET_SWITCH = "test_switch", "fault_reset_switch"
+CONTROLS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {TEST_SWITCH: ("A", "B", "centre"), FAULT_RESET_SWITCH: ("true", "false")}
+)
+"""The switches with their positions, as written in stimuli files and commands."""
+_TEST_BITS = {"A": SWITCH_A, "B": SWITCH_B, "centre": 0}
+_new = tuple.__new__
+"""Makes a named tuple as a plain one: its own constructor takes twice the time, and one is made at each interrupt."""
+REST_NS = 5_500_000
+"""Interval at which a plant whose drive rests is updated, ns: the system clock tick (decision)."""
+
+
 @dataclass
 class InterruptTiming:
     """Lateness of interrupts on the wall clock; in simulated time none is late.
@@ -165,16 +179,6 @@ def _nothing(now_ns: int, skipped: int) -> None:
     """Make no scan due: the interrupts are not armed."""
 
 
-PRESSED_NS = 500_000_000
-"""Time for which the fault reset switch is pressed, ns (decision)."""
-TEST_SWITCH, FAULT_RESET_SWITCH = "test_switch", "fault_reset_switch"
-CONTROLS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {TEST_SWITCH: ("A", "B", "centre"), FAULT_RESET_SWITCH: ("true", "false")}
-)
-"""The switches with their positions, as written in stimuli files and commands."""
-_TEST_BITS = {"A": SWITCH_A, "B": SWITCH_B, "centre": 0}
-
-
 class FrontSwitches:
     """The switches of one module."""
 
@@ -217,12 +221,6 @@ class FrontSwitches:
         if self._release is not None:
             self._release.cancel()
             self._release = None
-
-
-_new = tuple.__new__
-"""Makes a named tuple as a plain one: its own constructor takes twice the time, and one is made at each interrupt."""
-REST_NS = 5_500_000
-"""Interval at which a plant whose drive rests is updated, ns: the system clock tick (decision)."""
 
 
 class DriveControllerModule:

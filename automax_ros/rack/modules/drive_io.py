@@ -29,6 +29,9 @@ FULL_SCALE_V, FULL_SCALE_COUNTS = 10.0, 4095
 """Full scale of the input, V and counts (decision: as a 57C409)."""
 
 
+_OWN = 3 << FMCR_BIT | 1 << DRIVE_OK_BIT
+
+
 @cache
 def voltage_gain(line_v: float) -> float:
     """Return the gain of the transformer for a line's nominal voltage (V rms, line to line)."""
@@ -47,9 +50,6 @@ class DriveAnalogModule(IoModule):
     def feel(self, volts: float, line_v: float) -> None:
         """Show an armature voltage, V, through the transformer for a line's nominal voltage, V."""
         self._show(0, voltage_counts(volts, line_v))
-
-
-_OWN = 3 << FMCR_BIT | 1 << DRIVE_OK_BIT
 
 
 class DriveDigital:

@@ -17,6 +17,11 @@ from typing import Any, Protocol, runtime_checkable
 
 from automax_ros.rackfile.modules.network import HALF, LAST_DROP, MASTER, greatest_depth
 
+TIMEOUT_CYCLES, MISSES = 4, 4
+MOST_RIVALS = 8
+"""Most senders that are listed as rivals at one time (decision): a stranger can call itself anything."""
+_WRAP = 1 << 32
+
 
 @dataclass(frozen=True)
 class DropMessage:
@@ -107,12 +112,6 @@ class Station(Protocol):
     def status(self) -> NetworkStatus:
         """Return its status on the network."""
         ...
-
-
-TIMEOUT_CYCLES, MISSES = 4, 4
-MOST_RIVALS = 8
-"""Most senders that are listed as rivals at one time (decision): a stranger can call itself anything."""
-_WRAP = 1 << 32
 
 
 @dataclass

@@ -28,6 +28,9 @@ from automax_ros.runtime.tasks.keep_values import carry_over
 from automax_ros.runtime.tasks.task import Status
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 
+__all__ = ["KEEP_STATE", "OperationRefused", "Operations"]
+_POWER = EventKey(EventClass.OUTSIDE, 0, "power")
+
 
 def begin_memory(config: RackConfig, inputs: ProcessInputs, memory: CommonMemory) -> None:
     """Write the presets of the rack's file, with the rack as the writer."""
@@ -43,10 +46,6 @@ def write_status(config: RackConfig, modules: Sequence[Module], memory: CommonMe
     for view, spec in enumerate(memory.specs):
         if spec.name in shown:
             memory.write_from_outside(view, shown[spec.name], PRESET_WRITER)
-
-
-__all__ = ["KEEP_STATE", "OperationRefused", "Operations"]
-_POWER = EventKey(EventClass.OUTSIDE, 0, "power")
 
 
 class Operations:

@@ -37,6 +37,9 @@ MEANINGS = {
 """Meanings of the codes that are known; the whole table of the manuals is not."""
 
 
+_PROBLEMS = frozenset(kind.problem for kind in KINDS)
+
+
 @dataclass(frozen=True)
 class Display:
     """The display of one Processor: ``code`` is "" if it is blank, ``meaning`` is its meaning in words."""
@@ -92,9 +95,6 @@ def _is_on_processor(rack: Rack, task: str) -> bool:
 def _logged(log: ErrorLog) -> Iterator[str]:
     """Yield the codes in a log, the newest first."""
     return (entry.hardware for entry in reversed(log.entries) if entry.hardware)
-
-
-_PROBLEMS = frozenset(kind.problem for kind in KINDS)
 
 
 class DriveTrips:

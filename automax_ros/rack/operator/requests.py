@@ -37,6 +37,13 @@ MOST_OFF_S = 86_400
 _MOST_FINDINGS = 100
 
 
+MAX_NAME = 100
+"""Longest name that is accepted, in characters (decision: a bound on what strangers send)."""
+MAX_NAMES = 1000
+"""Most names in one request, and most values that its patterns mean (decision: likewise)."""
+_WILD = "*?"
+
+
 class ReloadRefused(OperationRefused):
     """A source was refused; ``findings`` are those of its check, each as a text of several lines."""
 
@@ -262,13 +269,6 @@ def _is_tunable(field: StateField) -> bool:
 
 def _source_value(value: Value | list[Value] | None) -> str:
     return f"{source_text(value)} again" if value is not None and not isinstance(value, list) else "not there any more"
-
-
-MAX_NAME = 100
-"""Longest name that is accepted, in characters (decision: a bound on what strangers send)."""
-MAX_NAMES = 1000
-"""Most names in one request, and most values that its patterns mean (decision: likewise)."""
-_WILD = "*?"
 
 
 @dataclass(frozen=True)

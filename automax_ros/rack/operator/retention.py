@@ -37,6 +37,14 @@ KeptTask = dict[str, Any]
 _VARIABLES = (Role.LOCAL, Role.TUNABLE)
 
 
+FORMAT = 2
+MOST_BYTES = 64_000_000
+"""Largest state file (decision: common memory and locals of four Processors are far below)."""
+_FILE = "state.json"
+Document = dict[str, Any]
+"""The whole kept state, as JSON has it."""
+
+
 def kept_task(task: Task, source: str) -> KeptTask:
     """Return the present state of a task that is to be kept, between two scans."""
     flat, at = task.snapshot(), 0
@@ -95,14 +103,6 @@ def _whole(number: object) -> int:
     if not isinstance(number, int) or isinstance(number, bool):
         raise TypeError("an error log is whole numbers")
     return number
-
-
-FORMAT = 2
-MOST_BYTES = 64_000_000
-"""Largest state file (decision: common memory and locals of four Processors are far below)."""
-_FILE = "state.json"
-Document = dict[str, Any]
-"""The whole kept state, as JSON has it."""
 
 
 class RetentionFault(UserError):

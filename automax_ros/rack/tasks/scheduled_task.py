@@ -25,6 +25,14 @@ StopAll = Callable[[str, str | None, str], None]
 """Stops the rack: called with the reason, the hardware's code if there is one, and the task."""
 
 
+_LONGEST_NS = 2**32 - 1
+"""Longest execution time that a message of a scan can hold."""
+_RUNNING = Status.RUNNING
+"""A constant, since it is read at each scan and an enumeration's member is slow to get."""
+After = Callable[[Task, ScanRecord | None], None]
+"""Called right after each scan, and after the part before SCAN_LOOP."""
+
+
 class ScanEnd:
     """Ends scans of one rack: observers are notified, waiting inputs unfreeze, a fault stops all."""
 
@@ -43,14 +51,6 @@ class ScanEnd:
             last = task.errors.last
             reason = f"task {task.name}: {last.describe() if last else 'fault'}"
             self._stop_all(reason, last.hardware if last else None, task.name)
-
-
-_LONGEST_NS = 2**32 - 1
-"""Longest execution time that a message of a scan can hold."""
-_RUNNING = Status.RUNNING
-"""A constant, since it is read at each scan and an enumeration's member is slow to get."""
-After = Callable[[Task, ScanRecord | None], None]
-"""Called right after each scan, and after the part before SCAN_LOOP."""
 
 
 class ScheduledTask:

@@ -21,6 +21,11 @@ from automax_ros.rackfile.model.module import ModuleConfig, TaskConfig
 from automax_ros.rackfile.reading.files import FileFault, read_task_source
 from automax_ros.rackfile.sections.feeds import feed_findings
 
+Rule = Callable[[RackConfig, Mapping[str, Program]], Mapping[str, Sequence[Diagnostic]]]
+"""Returns diagnostics by the task in whose source they are; called with the programs without errors."""
+RULES: tuple[Rule, ...] = (interrupt_findings, udc_findings, drive_findings, feed_findings, writer_findings)
+"""All rules among tasks and modules."""
+
 
 class CheckedTask(NamedTuple):
     """One task of a rack with the result of its check; diagnostics refer to ``source``."""
@@ -98,13 +103,6 @@ def with_findings(result: CheckResult, findings: Sequence[Diagnostic]) -> CheckR
         return result
     diagnostics = in_order([*result.diagnostics, *findings])
     return replace(result, program=None if has_errors(findings) else result.program, diagnostics=diagnostics)
-
-
-Rule = Callable[[RackConfig, Mapping[str, Program]], Mapping[str, Sequence[Diagnostic]]]
-"""Returns diagnostics by the task in whose source they are; called with the programs without errors."""
-
-RULES: tuple[Rule, ...] = (interrupt_findings, udc_findings, drive_findings, feed_findings, writer_findings)
-"""All rules among tasks and modules."""
 
 
 def findings_by_task(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:

@@ -42,6 +42,9 @@ _REGISTERS = Registers(
 )
 
 
+_ANALOG_REGISTERS = Registers(4, by_itself=True)
+
+
 @dataclass(frozen=True)
 class DriveConfig(WithoutTasks):
     """A 57C406; without a ``plant`` it has registers and switches only, and its loop measures no line."""
@@ -86,9 +89,6 @@ class DriveControllerKind:
 
 
 DRIVE_CONTROLLER = DriveControllerKind()
-
-
-_ANALOG_REGISTERS = Registers(4, by_itself=True)
 
 
 @dataclass(frozen=True)

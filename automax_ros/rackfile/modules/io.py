@@ -40,6 +40,39 @@ from automax_ros.core.json_schema import Keys
 from automax_ros.rackfile.model.module import Interrupt, Registers, TaskConfig
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 
+DRIVE_MODEL = "57C408"
+"""The drive digital I/O module."""
+DRIVE_INPUTS, DRIVE_OUTPUTS = 0, 1
+"""The registers of a drive's 57C408."""
+PERMISSIVE_BIT, EXTERNAL_TRIP_BIT = 0, 1
+FMCR_BIT, RMCR_BIT, DRIVE_OK_BIT = 0, 1, 2
+_OUTPUTS = Registers(1, outputs=range(1))
+_DRIVE = Registers(2, outputs=range(1, 2))
+_INPUTS = Registers(4, outputs=range(2, 4), interrupts=(Interrupt(status=2, period=3, inputs=range(2)),))
+_ANALOG_INPUTS = Registers(
+    7,
+    outputs=frozenset({2, 3, 5, 6}),
+    interrupts=(
+        Interrupt(status=5, period=2, inputs=range(1)),
+        Interrupt(status=6, period=3, inputs=range(1, 2)),
+    ),
+    clock_status=((4, 0x0500),),
+)
+_RESOLVER_REGISTERS = Registers(
+    5,
+    outputs=range(3, 5),
+    interrupts=(Interrupt(status=3, period=4, inputs=range(2)),),
+    copies=((3, 2),),
+)
+TIMER_ENABLE = 5
+"""The bit of register 5 that enables the timer interrupt."""
+_COUNTER_REGISTERS = Registers(
+    8,
+    outputs=range(2, 7),
+    interrupts=(Interrupt(status=5, period=2, inputs=range(2), enable=TIMER_ENABLE),),
+    counters=(0,),
+)
+
 
 class WithoutTasks:
     """The common part of the configurations of modules that run no tasks and hold no common variables."""
@@ -111,16 +144,6 @@ class IoKind:
         """Report nothing: no source names a slot where these modules may not be."""
 
 
-DRIVE_MODEL = "57C408"
-"""The drive digital I/O module."""
-DRIVE_INPUTS, DRIVE_OUTPUTS = 0, 1
-"""The registers of a drive's 57C408."""
-PERMISSIVE_BIT, EXTERNAL_TRIP_BIT = 0, 1
-FMCR_BIT, RMCR_BIT, DRIVE_OK_BIT = 0, 1, 2
-_OUTPUTS = Registers(1, outputs=range(1))
-_DRIVE = Registers(2, outputs=range(1, 2))
-_INPUTS = Registers(4, outputs=range(2, 4), interrupts=(Interrupt(status=2, period=3, inputs=range(2)),))
-
 DIGITAL_IO = IoKind(
     "digital I/O",
     "digital_io",
@@ -133,16 +156,6 @@ DIGITAL_IO = IoKind(
 )
 
 
-_ANALOG_INPUTS = Registers(
-    7,
-    outputs=frozenset({2, 3, 5, 6}),
-    interrupts=(
-        Interrupt(status=5, period=2, inputs=range(1)),
-        Interrupt(status=6, period=3, inputs=range(1, 2)),
-    ),
-    clock_status=((4, 0x0500),),
-)
-
 ANALOG_IO = IoKind(
     "analog I/O",
     "analog_io",
@@ -153,23 +166,7 @@ ANALOG_IO = IoKind(
 )
 
 
-_RESOLVER_REGISTERS = Registers(
-    5,
-    outputs=range(3, 5),
-    interrupts=(Interrupt(status=3, period=4, inputs=range(2)),),
-    copies=((3, 2),),
-)
-
 RESOLVER = IoKind("resolver input", "resolver", {"57C411": IoModel("resolver input module", _RESOLVER_REGISTERS)})
 
-
-TIMER_ENABLE = 5
-"""The bit of register 5 that enables the timer interrupt."""
-_COUNTER_REGISTERS = Registers(
-    8,
-    outputs=range(2, 7),
-    interrupts=(Interrupt(status=5, period=2, inputs=range(2), enable=TIMER_ENABLE),),
-    counters=(0,),
-)
 
 PULSETACH = IoKind("pulsetach input", "pulsetach", {"57C421": IoModel("pulsetach input module", _COUNTER_REGISTERS)})

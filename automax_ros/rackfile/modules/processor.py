@@ -36,6 +36,9 @@ _SLOTS = range(1, 5)
 """Slots of Processors next to a common memory module (J2-3106-1 p. 10-2)."""
 
 
+NODE = "pc3000"
+
+
 @dataclass(frozen=True)
 class ProcessorConfig:
     """A Processor module; ``model`` is its number as the manuals write it (``57C430A``), tasks in the file's order."""
@@ -132,9 +135,6 @@ def _check_model(found: ModuleSection) -> None:
     if found.executive < since:
         message = f"{found.where} needs executive {version_text(since)} or later, not {version_text(found.executive)}"
         found.findings.add("AMX6703", message, found.span)
-
-
-NODE = "pc3000"
 
 
 @dataclass(frozen=True)

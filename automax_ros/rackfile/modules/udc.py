@@ -81,6 +81,15 @@ _VALUE_BYTES = {DataType.BOOLEAN: 1, DataType.INTEGER: 2, DataType.DOUBLE: 4, Da
 _STATE_BYTES = 4
 
 
+MAX_UDCS = 10
+"""Most UDC modules of one rack (J2-3106-1 p. 2-5)."""
+DRIVES = ("A", "B")
+"""The drives of a UDC, in the order in which their tasks run."""
+_PLANTS = may_be_empty(
+    section("The plants that its drives turn.", {drive: plant_name(f"The plant of drive {drive}.") for drive in DRIVES})
+)
+
+
 def estimated_bytes(program: Program) -> int:
     """Return the approximate size of a task, in bytes: its code, its locals, and the state of its blocks."""
     statements = list(statements_in_order((*program.startup, *program.scan)))
@@ -105,12 +114,6 @@ def _states(program: Program) -> int:
         for bound in program.calls.values()
         for state in bound.block.states
     )
-
-
-MAX_UDCS = 10
-"""Most UDC modules of one rack (J2-3106-1 p. 2-5)."""
-DRIVES = ("A", "B")
-"""The drives of a UDC, in the order in which their tasks run."""
 
 
 @dataclass(frozen=True)
@@ -165,11 +168,6 @@ class _Drives:
             self._taken[text] = node.span
             return TaskPlace(DRIVES.index(text), text)
         return None
-
-
-_PLANTS = may_be_empty(
-    section("The plants that its drives turn.", {drive: plant_name(f"The plant of drive {drive}.") for drive in DRIVES})
-)
 
 
 class UdcKind:

@@ -46,6 +46,17 @@ _PAIR_BITS = 2 * _BITS
 _MODEL = next(iter(UDC.models))
 
 
+_PROCESSOR = "57C435"
+_MOST_FILES = 10_000
+"""Most entries of a folder that are read (decision: a bound on untrusted folders)."""
+_MOST_NAMED = 4
+"""Most tasks that are named next to a common that they share."""
+_RACK_NAME_LIMIT = 8
+_COMMENT_COLUMN = 36
+_UNKNOWN_NS = 1 << 62
+"""Scan period of a task with errors."""
+
+
 def is_udc_task(module: Module) -> bool:
     """Return whether a task calls a block that no Processor has."""
     calls = (item.block for item, _ in statements_in_order(module.statements) if isinstance(item, Call))
@@ -111,17 +122,6 @@ def _groups(simple: Sequence[CommonSpec], written: set[str]) -> Iterator[list[Co
     yield [spec for spec in flags if spec.name not in written]
     yield [spec for spec in simple if spec.type in (DataType.DOUBLE, DataType.REAL)]
     yield [spec for spec in simple if spec.type is DataType.INTEGER]
-
-
-_PROCESSOR = "57C435"
-_MOST_FILES = 10_000
-"""Most entries of a folder that are read (decision: a bound on untrusted folders)."""
-_MOST_NAMED = 4
-"""Most tasks that are named next to a common that they share."""
-_RACK_NAME_LIMIT = 8
-_COMMENT_COLUMN = 36
-_UNKNOWN_NS = 1 << 62
-"""Scan period of a task with errors."""
 
 
 class DraftFault(UserError):

@@ -31,6 +31,9 @@ _MOST_ROUNDS = 50
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
+_Cure = Callable[[str, str], str | None]
+
+
 @dataclass(frozen=True)
 class Converted:
     """A source before and after its conversion: texts, and ``data``, the bytes to store; ``notes`` list the changes.
@@ -222,7 +225,6 @@ def _in_parts(constant: str, before: str) -> str | None:
     return "; ".join(f"{quote}{part}{quote}" for part in parts)
 
 
-_Cure = Callable[[str, str], str | None]
 _CURES: dict[str, tuple[str, _Cure]] = {
     "AMX0021": ("text in parts", _in_parts),
     "AMX2016": ("decimal point", _with_point),

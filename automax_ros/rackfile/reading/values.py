@@ -22,6 +22,12 @@ MAX_FINDINGS = 200
 _YAML_CODES = {Flaw.SYNTAX: "AMX6003", Flaw.EXTRA: "AMX6004", Flaw.SIZE: "AMX6005"}
 
 
+_OCTAL = re.compile(r"[-+]?0+[0-9]")
+"""Leading zeros make YAML read another number."""
+_T = TypeVar("_T", int, float)
+Entry = tuple[Scalar, Node]
+
+
 class ProblemList:
     """The diagnostics of one file so far."""
 
@@ -66,11 +72,6 @@ class ProblemList:
     def in_order(self) -> list[Diagnostic]:
         """Return the diagnostics sorted by place."""
         return in_order(self._items[Severity.ERROR] + self._items[Severity.WARNING])
-
-
-_OCTAL = re.compile(r"[-+]?0+[0-9]")
-"""Leading zeros make YAML read another number."""
-_T = TypeVar("_T", int, float)
 
 
 def kind_of(node: Node) -> str:
@@ -166,9 +167,6 @@ def number_hint(node: Node) -> str | None:
     if node.plain and digits.startswith("0") and digits.isdecimal() and digits.strip("0"):
         return f"write {digits.lstrip('0')} without leading zeros"
     return None
-
-
-Entry = tuple[Scalar, Node]
 
 
 def entries_of(node: Node, what: str, findings: ProblemList) -> tuple[Entry, ...] | None:

@@ -52,6 +52,37 @@ from automax_ros.rackfile.sections.points import KEYS, PointReader
 _CODE = "AMX6406"
 
 
+UNIT_LIMIT = 16
+DESCRIPTION_LIMIT = 200
+"""Longest `unit` and longest `description`, in characters (decision)."""
+MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
+"""Range of `rate_limit_hz` (decision: 2000 Hz is one message per tick of 0.5 ms)."""
+_DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
+OPTIONS: Keys = {
+    "ros": words("`out`: a topic with the value; `in`: that, and one that writes it; `closed`: neither.", _DIRECTIONS),
+    "rate_limit_hz": number("Most messages per second on the topic.", MIN_RATE_HZ, MAX_RATE_HZ),
+    "preset": either(
+        "Written when the rack starts; for an array also a list, the last subscript running fastest.",
+        scalar("The value, for an array that of each element."),
+        listed("A value for each element.", scalar("The value of an element.")),
+    ),
+    "non_volatile": flag("Whether the value survives STOP ALL, a power cycle and a restart.", False),
+    "unit": line("The engineer's unit.", UNIT_LIMIT),
+    "scale": SCALE,
+    "description": line("A line about the variable.", DESCRIPTION_LIMIT),
+    **KEYS,
+}
+"""The keys of a common variable."""
+SCHEMA: Schema = may_be_empty(
+    entries(
+        "The rack's common variables: name, type character, length of a string, largest subscripts.",
+        COMMON_NAME,
+        may_be_empty(section("A common variable.", OPTIONS)),
+    )
+)
+_PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
+
+
 def preset_value(
     node: Node, variable: VariableName, elements: int, findings: ProblemList
 ) -> Value | tuple[Value, ...] | None:
@@ -86,38 +117,6 @@ def _text(node: Node, length: int, what: str, findings: ProblemList) -> str | No
         findings.add(_CODE, f"{what} has {len(text)} characters; the string holds {length}", node.span)
         return None
     return text
-
-
-UNIT_LIMIT = 16
-DESCRIPTION_LIMIT = 200
-"""Longest `unit` and longest `description`, in characters (decision)."""
-MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
-"""Range of `rate_limit_hz` (decision: 2000 Hz is one message per tick of 0.5 ms)."""
-
-_DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
-OPTIONS: Keys = {
-    "ros": words("`out`: a topic with the value; `in`: that, and one that writes it; `closed`: neither.", _DIRECTIONS),
-    "rate_limit_hz": number("Most messages per second on the topic.", MIN_RATE_HZ, MAX_RATE_HZ),
-    "preset": either(
-        "Written when the rack starts; for an array also a list, the last subscript running fastest.",
-        scalar("The value, for an array that of each element."),
-        listed("A value for each element.", scalar("The value of an element.")),
-    ),
-    "non_volatile": flag("Whether the value survives STOP ALL, a power cycle and a restart.", False),
-    "unit": line("The engineer's unit.", UNIT_LIMIT),
-    "scale": SCALE,
-    "description": line("A line about the variable.", DESCRIPTION_LIMIT),
-    **KEYS,
-}
-"""The keys of a common variable."""
-SCHEMA: Schema = may_be_empty(
-    entries(
-        "The rack's common variables: name, type character, length of a string, largest subscripts.",
-        COMMON_NAME,
-        may_be_empty(section("A common variable.", OPTIONS)),
-    )
-)
-_PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 
 
 class CommonReader:

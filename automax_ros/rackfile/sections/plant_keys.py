@@ -52,6 +52,19 @@ INERTIA_SCHEMA: Schema = number("Inertia of motor and load over the motor's own.
 _ALONE = "speed_rpm"
 
 
+LEAST_MS, MOST_MS, USUAL_MS = 0.1, 10_000.0, 1.0
+"""Range of ``every_ms``, and its default (decision: an instrument is quicker than most scans)."""
+FEED_KEYS: Keys = {
+    "signal": words("What the instrument shows.", SIGNALS),
+    "every_ms": number("How often it is written, ms.", LEAST_MS, MOST_MS, USUAL_MS),
+    "scale": SCALE,
+}
+_FED = r"^[A-Za-z_][A-Za-z0-9_]{0,15}[%!]?\s*([(\[][0-9, ]*[)\]])?$"
+FEED_SCHEMA: Schema = may_be_empty(
+    entries("Signals of the plant into commons.", _FED, section("A feed.", FEED_KEYS, ("signal",)))
+)
+
+
 def read_supply(node: Node, what: str, findings: ProblemList) -> SupplyConfig:
     """Return a plant's AC line; report errors in the findings."""
     where = f"line of {what}"
@@ -144,16 +157,3 @@ def _pair(node: Node, what: str, findings: ProblemList) -> tuple[float, float] |
     rpm = number_value(node.items[0], f"rpm of {what}", findings, low=low, high=high, code=CODE)
     torque = number_value(node.items[1], f"N m of {what}", findings, low=least, high=most, code=CODE)
     return None if rpm is None or torque is None else (rpm, torque)
-
-
-LEAST_MS, MOST_MS, USUAL_MS = 0.1, 10_000.0, 1.0
-"""Range of ``every_ms``, and its default (decision: an instrument is quicker than most scans)."""
-FEED_KEYS: Keys = {
-    "signal": words("What the instrument shows.", SIGNALS),
-    "every_ms": number("How often it is written, ms.", LEAST_MS, MOST_MS, USUAL_MS),
-    "scale": SCALE,
-}
-_FED = r"^[A-Za-z_][A-Za-z0-9_]{0,15}[%!]?\s*([(\[][0-9, ]*[)\]])?$"
-FEED_SCHEMA: Schema = may_be_empty(
-    entries("Signals of the plant into commons.", _FED, section("A feed.", FEED_KEYS, ("signal",)))
-)

@@ -23,6 +23,11 @@ from automax_ros.runtime.scan.error_log import snapshot_layout
 from automax_ros.runtime.tasks.make_task import make_task
 from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, Status, Task
 
+_MOST_NAMES = 8
+_STOPPED_KEY = "status"
+_QUIET_SCANS = 2
+"""A task that has not scanned for more periods than this no longer runs."""
+
 
 def execute(bag: Path, task: Task, scan: Scan, now_ns: int) -> ScanRecord | None:
     """Execute a scan at an instant of rack time; None if the task no longer runs.
@@ -45,12 +50,6 @@ def _overlap(task: Task, scan: Scan, now_ns: int) -> ScanRecord | None:
     """Fault the task where the recorded one was faulted for its time, which no execution of a source can show."""
     code = next((error.code for error in scan.errors if error.code in (OVERLAP, EVENT_TIMEOUT)), None)
     return None if code is None else task.fault(code, now_ns)
-
-
-_MOST_NAMES = 8
-_STOPPED_KEY = "status"
-_QUIET_SCANS = 2
-"""A task that has not scanned for more periods than this no longer runs."""
 
 
 class TaskReplay:

@@ -27,6 +27,12 @@ from automax_ros.rack.tasks.installation import PreparedReload
 from automax_ros.ros.base.lifecycle import ACTIVE, INACTIVE, UNCONFIGURED, LifecycleNode, Pending, TransitionRefused
 from automax_ros.ros.base.node import ModuleNode, RackContext
 
+NOT_OPERATED = "the rack's YAML file does not say `operator: true`"
+"""Why a requested transition that stops or runs tasks is refused."""
+DEACTIVATED = "the node rack was deactivated"
+"""Reason of the STOP ALL that makes the nodes of the modules inactive too, in every process."""
+_BEFORE_THE_RACK = "the rack has not been activated yet: activate its node rack first"
+
 
 class Background:
     """Does long work for one node while the rack scans.
@@ -60,13 +66,6 @@ class Background:
     def close(self) -> None:
         """Discard the results of work in progress."""
         self._closed = True
-
-
-NOT_OPERATED = "the rack's YAML file does not say `operator: true`"
-"""Why a requested transition that stops or runs tasks is refused."""
-DEACTIVATED = "the node rack was deactivated"
-"""Reason of the STOP ALL that makes the nodes of the modules inactive too, in every process."""
-_BEFORE_THE_RACK = "the rack has not been activated yet: activate its node rack first"
 
 
 class ManagedModuleNode(LifecycleNode, ModuleNode):

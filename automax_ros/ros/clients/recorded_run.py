@@ -30,6 +30,18 @@ HOME_TOPICS = ("variables", "config", "backplane", "backplane/snapshot", "operat
 """The participant that publishes all of these in a namespace is the rack, or its process with common memory."""
 
 
+SILENT_NS = 3 * NS_PER_S
+"""If a rack is silent this long while another of its name publishes its variable table, it was restarted (decision: one
+that was killed stands in the graph for up to 20 s)."""
+LOOK_NS = NS_PER_S // 4
+GRACE_NS = NS_PER_S
+"""Messages of a process of the rack may arrive this long before its presence."""
+MOST_TABLES = 16
+"""Most tables of other programs that are kept."""
+MOST_PROCESSES = 64
+"""Most processes of one rack."""
+
+
 def participant(gid: bytes) -> bytes:
     """Return the part of a GID that all publishers of one program share; empty if the GID is unknown."""
     return gid[:PREFIX_BYTES]
@@ -49,18 +61,6 @@ def racks_of(node: Node, space: str) -> set[bytes]:
         if not found:
             return set()
     return found or set()
-
-
-SILENT_NS = 3 * NS_PER_S
-"""If a rack is silent this long while another of its name publishes its variable table, it was restarted (decision: one
-that was killed stands in the graph for up to 20 s)."""
-LOOK_NS = NS_PER_S // 4
-GRACE_NS = NS_PER_S
-"""Messages of a process of the rack may arrive this long before its presence."""
-MOST_TABLES = 16
-"""Most tables of other programs that are kept."""
-MOST_PROCESSES = 64
-"""Most processes of one rack."""
 
 
 @dataclass

@@ -47,6 +47,25 @@ _LOOK_NS = 100 * NS_PER_MS
 """Time between two checks (decision): the graph is queried for each topic."""
 
 
+LOOK_S = 0.025
+"""Seconds between two polls of the topics."""
+HOLD_NS = 250 * NS_PER_MS
+"""How long a message is held for those that were sent before it and arrive later."""
+MOST_BYTES = 64 << 20
+"""Longest message that is read (decision: an image of the largest rack is a fraction of it)."""
+READER_DEPTH = 10_000
+"""Messages of one topic that wait in this process when it is held up."""
+FILES_WAIT_NS = 3 * NS_PER_S
+"""How long to wait for a rack's files once its table has arrived."""
+_KNOCK_NS = NS_PER_S
+_SLOW_KNOCK_NS = 10 * _KNOCK_NS
+_MOST_KNOCKS = 5
+"""Number of requests at intervals of one second; later ones are sent every ten seconds."""
+_TABLE_TYPE = "automax_msgs/msg/VariableTable"
+_FILES = TopicKind("std_msgs/msg/String", LATCHED)
+_PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
+
+
 class RecorderWait:
     """Checks whether a recorder has subscribed to the topics of one process."""
 
@@ -70,25 +89,6 @@ class RecorderWait:
     def _is_heard(self, topic: str) -> bool:
         readers = self._node.get_subscriptions_info_by_topic(topic)
         return any(item.node_name == self._name and item.node_namespace == self._space for item in readers)
-
-
-LOOK_S = 0.025
-"""Seconds between two polls of the topics."""
-HOLD_NS = 250 * NS_PER_MS
-"""How long a message is held for those that were sent before it and arrive later."""
-MOST_BYTES = 64 << 20
-"""Longest message that is read (decision: an image of the largest rack is a fraction of it)."""
-READER_DEPTH = 10_000
-"""Messages of one topic that wait in this process when it is held up."""
-FILES_WAIT_NS = 3 * NS_PER_S
-"""How long to wait for a rack's files once its table has arrived."""
-_KNOCK_NS = NS_PER_S
-_SLOW_KNOCK_NS = 10 * _KNOCK_NS
-_MOST_KNOCKS = 5
-"""Number of requests at intervals of one second; later ones are sent every ten seconds."""
-_TABLE_TYPE = "automax_msgs/msg/VariableTable"
-_FILES = TopicKind("std_msgs/msg/String", LATCHED)
-_PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
 
 
 class SeveralRacks(UserError):

@@ -34,6 +34,11 @@ Local = Callable[[Any, Any], Any]
 """Executes a request in this process and returns the response."""
 
 
+_ADDED = ("tasks", "running", "ended")
+"""Fields of a status that count for one process and are added up."""
+_NOT_TOGETHER = ("pause", "resume", "step")
+
+
 def operate_name(module: str, service: str) -> str:
     """Return the service, in the rack's namespace, by which a process executes forwarded requests."""
     return f"{module}/operate/{service}"
@@ -304,9 +309,6 @@ def _status(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
     return [Target(THIS_PROCESS, request)] if request.home_only else forwarding.everybody(request)
 
 
-_ADDED = ("tasks", "running", "ended")
-"""Fields of a status that count for one process and are added up."""
-_NOT_TOGETHER = ("pause", "resume", "step")
 _SHARING: dict[str, Callable[[RequestForwarder, Any, Any], list[Target]]] = {
     "run": _by_task,
     "stop": _by_task,

@@ -17,6 +17,12 @@ from rclpy.node import Node
 
 from automax_ros.runtime.health import Health
 
+FAILED, REFUSED = "failed callback", "refused request"
+"""Names under which ``Health`` counts them."""
+MOST_TOLD, MOST_LOGGED = 300, 20
+"""Most characters of an error, and most failures, that are logged: a client may repeat a bad request forever."""
+_LAST_TYPE = ParameterType.PARAMETER_STRING_ARRAY
+
 
 class Throttle:
     """Passes at most once per ``interval_s`` seconds of the wall clock.
@@ -36,13 +42,6 @@ class Throttle:
             return False
         self._next_s = now + self._interval_s
         return True
-
-
-FAILED, REFUSED = "failed callback", "refused request"
-"""Names under which ``Health`` counts them."""
-MOST_TOLD, MOST_LOGGED = 300, 20
-"""Most characters of an error, and most failures, that are logged: a client may repeat a bad request forever."""
-_LAST_TYPE = ParameterType.PARAMETER_STRING_ARRAY
 
 
 class RequestGuard:

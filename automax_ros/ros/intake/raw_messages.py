@@ -14,6 +14,11 @@ from typing import Any, NamedTuple, Protocol
 
 from automax_ros.ros.intake.rcl import OK, TAKE_FAILED, Bytes, Library, MessageInfo, library
 
+MOST_SENDERS = 64
+"""Most senders of a topic that are remembered (decision: a bound); the one known longest is forgotten first."""
+MOST_MISSING = 1_000_000
+"""A larger gap in a sender's numbers is not counted: any program can send any number."""
+
 
 class RawMessage(NamedTuple):
     """A message: its bytes (None if it is longer than wanted), its size, when it was sent (ns, the sender's clock).
@@ -114,12 +119,6 @@ class TopicReader:
         rcl = library()
         assert rcl is not None
         return int(rcl.on_message(pointer, callback, data))
-
-
-MOST_SENDERS = 64
-"""Most senders of a topic that are remembered (decision: a bound); the one known longest is forgotten first."""
-MOST_MISSING = 1_000_000
-"""A larger gap in a sender's numbers is not counted: any program can send any number."""
 
 
 class SequenceTracker:

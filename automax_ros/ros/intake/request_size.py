@@ -29,16 +29,6 @@ a number 1. So 680 parameters, 3,800 texts, 65,000 numbers or 1 MB of text are t
 50 us for a parameter, 0.02 us for a text, 0.006 us for a number (measured on a busy machine)."""
 
 
-class RequestTooLarge(Exception):
-    """A message is larger than a rack accepts."""
-
-
-class _Many(ctypes.Structure):
-    """A string or a sequence."""
-
-    _fields_ = [("data", ctypes.c_void_p), ("size", ctypes.c_size_t), ("capacity", ctypes.c_size_t)]
-
-
 _NUMBERS: dict[str, Any] = {
     "boolean": ctypes.c_bool,
     "octet": ctypes.c_uint8,
@@ -50,6 +40,16 @@ _NUMBERS: dict[str, Any] = {
     **{f"{sign}int{bits}": getattr(ctypes, f"c_{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
 }
 Weigh = Callable[[Any], int]
+
+
+class RequestTooLarge(Exception):
+    """A message is larger than a rack accepts."""
+
+
+class _Many(ctypes.Structure):
+    """A string or a sequence."""
+
+    _fields_ = [("data", ctypes.c_void_p), ("size", ctypes.c_size_t), ("capacity", ctypes.c_size_t)]
 
 
 def request_size(kind: Any, address: int) -> int:

@@ -24,6 +24,10 @@ Respond = Callable[[Any], None]
 """Sends a response."""
 
 
+Refuse = Callable[[Any, Exception], Any]
+"""Returns the response to a failed request, from the service's class and the error."""
+
+
 @dataclass(frozen=True)
 class DeferredResponse:
     """Placeholder for a response that is sent later."""
@@ -42,10 +46,6 @@ def allow_deferred(service: Any) -> None:
             send(response, header)
 
     service.send_response = send_response
-
-
-Refuse = Callable[[Any, Exception], Any]
-"""Returns the response to a failed request, from the service's class and the error."""
 
 
 class ServiceRequests:

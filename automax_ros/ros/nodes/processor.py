@@ -38,6 +38,9 @@ ERRORS_SHOWN = 5
 """Most errors of one scan that are logged."""
 
 
+_SHOWN = {"iscr": ISCR, "scans_per_interrupt": SCANS_PER_INTERRUPT, "scans_since_interrupt": SCAN_COUNTER}
+
+
 class ProcessorNode(ManagedModuleNode):
     """Node of one Processor; the scheduler of the rack scans its tasks."""
 
@@ -160,9 +163,6 @@ class ProcessorNode(ManagedModuleNode):
 
 def _described(task: Task, entry: LogEntry) -> str:
     return f"{task.name}: {entry.describe()}"
-
-
-_SHOWN = {"iscr": ISCR, "scans_per_interrupt": SCANS_PER_INTERRUPT, "scans_since_interrupt": SCAN_COUNTER}
 
 
 class UdcNode(ProcessorNode):

@@ -41,6 +41,9 @@ from automax_ros.runtime.health import Health
 from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Task
 
+_RUNS = ("run", "run_all")
+"""The operations that put tasks into RUN."""
+
 
 class RunningRack(Protocol):
     """A rack with its nodes."""
@@ -102,10 +105,6 @@ class RackLifecycle:
         """STOP ALL, so that no output stays on."""
         if self._held.rack.operations.powered:
             self._held.deactivate()
-
-
-_RUNS = ("run", "run_all")
-"""The operations that put tasks into RUN."""
 
 
 class RackNode(LifecycleNode, RackRosNode):

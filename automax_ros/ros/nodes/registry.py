@@ -33,6 +33,22 @@ Facts = dict[str, tuple[bool | int | float | str, str]]
 """Value and description by name."""
 
 
+NODES: dict[ModuleKind, Callable[[RackContext, Module], ModuleNode] | None] = {
+    PROCESSOR: ProcessorNode,
+    PC3000: ProcessorNode,
+    COMMON_MEMORY: None,
+    DIGITAL_IO: IoModuleNode,
+    ANALOG_IO: IoModuleNode,
+    RESOLVER: IoModuleNode,
+    PULSETACH: IoModuleNode,
+    DRIVE_CONTROLLER: IoModuleNode,
+    DRIVE_ANALOG: IoModuleNode,
+    NETWORK: NetworkNode,
+    UDC: UdcNode,
+}
+"""The node of each kind of module; None where the rack's common memory node is enough."""
+
+
 def run_facts(run_id: int) -> Facts:
     """Return the facts of one run, known once it begins: processes of a distributed rack agree on its number."""
     return {"run_id": (run_id, "number of the run, as in VariableTable")}
@@ -59,22 +75,6 @@ def module_facts(module: ModuleConfig) -> Facts:
     if module.tasks:
         facts["tick_ms"] = (module.tick_ns / NS_PER_MS, "its tick in ms")
     return facts
-
-
-NODES: dict[ModuleKind, Callable[[RackContext, Module], ModuleNode] | None] = {
-    PROCESSOR: ProcessorNode,
-    PC3000: ProcessorNode,
-    COMMON_MEMORY: None,
-    DIGITAL_IO: IoModuleNode,
-    ANALOG_IO: IoModuleNode,
-    RESOLVER: IoModuleNode,
-    PULSETACH: IoModuleNode,
-    DRIVE_CONTROLLER: IoModuleNode,
-    DRIVE_ANALOG: IoModuleNode,
-    NETWORK: NetworkNode,
-    UDC: UdcNode,
-}
-"""The node of each kind of module; None where the rack's common memory node is enough."""
 
 
 def nodes_of(site: RackContext) -> tuple[ModuleNode, ...]:

@@ -46,6 +46,17 @@ MOST_BYTES = 1 << 20
 """Longest part that is read."""
 
 
+PERIOD_NS = NS_PER_S
+"""Period at which statistics are published and tables are checked, rack time."""
+LOOK_NS = 100 * NS_PER_MS
+"""Shortest time between two checks after operations, rack time."""
+STATISTICS_DEPTH = 10
+DELETED = "deleted"
+"""The status of a task that was deleted from the rack."""
+_UNCOUNTED = frozenset({"scans", "skipped"})
+"""Fields whose change alone is not a reason to publish a table of tasks."""
+
+
 class JoinedTasks:
     """Receives the parts; ``changed`` is called after each. For the process with common memory."""
 
@@ -80,17 +91,6 @@ class JoinedTasks:
 
     def _refuse(self, topic: str, what: str) -> None:
         self._site.health.note("refused table", what[:40], lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS)
-
-
-PERIOD_NS = NS_PER_S
-"""Period at which statistics are published and tables are checked, rack time."""
-LOOK_NS = 100 * NS_PER_MS
-"""Shortest time between two checks after operations, rack time."""
-STATISTICS_DEPTH = 10
-DELETED = "deleted"
-"""The status of a task that was deleted from the rack."""
-_UNCOUNTED = frozenset({"scans", "skipped"})
-"""Fields whose change alone is not a reason to publish a table of tasks."""
 
 
 class StatusTables:

@@ -33,6 +33,12 @@ _LOOPBACK, _NETWORK, _SOON = (
 )
 
 
+RANGES = ("localhost", "subnet", "off")
+"""The ranges to choose from; ``off`` reaches no other process."""
+_OLD = "ROS_LOCALHOST_ONLY"
+_WORDS = {"LOCALHOST": "this host", "SUBNET": "the whole subnet", "OFF": "nobody"}
+
+
 def announce_soon() -> None:
     """Make this process announce itself each 250 ms; call it before rclpy is initialised (decision).
 
@@ -67,12 +73,6 @@ def _is_fast_dds() -> bool:
 def is_on_loopback() -> bool:
     """Whether this process uses the loopback alone, whatever its range says."""
     return os.environ.get(_PROFILES) == str(_LOOPBACK)
-
-
-RANGES = ("localhost", "subnet", "off")
-"""The ranges to choose from; ``off`` reaches no other process."""
-_OLD = "ROS_LOCALHOST_ONLY"
-_WORDS = {"LOCALHOST": "this host", "SUBNET": "the whole subnet", "OFF": "nobody"}
 
 
 def choose_range(chosen: str | None) -> None:

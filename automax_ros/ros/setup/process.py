@@ -26,6 +26,16 @@ _SECURITY = "ROS_SECURITY_ENABLE"
 _MOST_TOLD = 400
 
 
+_TRIAL_PERIOD_S = 0.001
+_TRIAL_LIMIT_S = 0.2
+_ANSWER_S = 0.5
+"""An executor that has not begun a task after this time is not spun, or is spun by the waiting thread."""
+_PASS_S = 10.0
+"""Longest wait for an executor that is spun: it may be in a long callback."""
+_SPIN_S = 0.1
+"""Longest wait of the executor for an event."""
+
+
 def joined_context(arguments: RosArguments = NO_ARGUMENTS) -> Context:
     """Return a context that has joined the graph; the caller shuts it down.
 
@@ -50,14 +60,6 @@ def _try_security(context: Context) -> None:
         RuntimeError: it fails.
     """
     Node("security_check", context=context, enable_rosout=False, start_parameter_services=False).destroy_node()
-
-
-_TRIAL_PERIOD_S = 0.001
-_TRIAL_LIMIT_S = 0.2
-_ANSWER_S = 0.5
-"""An executor that has not begun a task after this time is not spun, or is spun by the waiting thread."""
-_PASS_S = 10.0
-"""Longest wait for an executor that is spun: it may be in a long callback."""
 
 
 def make_executor(context: Context) -> Any:
@@ -123,10 +125,6 @@ def take_out(executor: Any, nodes: Iterable[Node], *, spun: bool = True) -> None
             executor.create_task(begun.set)
             if not begun.wait(limit_s):
                 return
-
-
-_SPIN_S = 0.1
-"""Longest wait of the executor for an event."""
 
 
 class RosProcess:

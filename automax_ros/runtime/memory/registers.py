@@ -24,6 +24,13 @@ WORD = 0xFFFF
 _TWO_WORDS = (DataType.DOUBLE, DataType.REAL)
 
 
+BUS_ERROR = 7031
+"""The run-time error of a register that does not answer (hardware code 31, J-3650 p. 5-3).
+
+It is logged, IOREAD% gives 0, IOWRITE writes nothing, and the task goes on (decision: none says that it stops all).
+"""
+
+
 class Part(NamedTuple):
     """The effect of a write on one register: the bits of ``mask`` become those of ``bits``."""
 
@@ -156,13 +163,6 @@ def _real_of(bits: int) -> float:
     """Return the REAL in two registers; bits that are not one show as 0 or as its largest (decision)."""
     value: float = struct.unpack(">f", bits.to_bytes(4, "big"))[0]
     return 0.0 if math.isnan(value) else stored_real(value)[0]
-
-
-BUS_ERROR = 7031
-"""The run-time error of a register that does not answer (hardware code 31, J-3650 p. 5-3).
-
-It is logged, IOREAD% gives 0, IOWRITE writes nothing, and the task goes on (decision: none says that it stops all).
-"""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,12 @@ from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType
 from automax_ros.drive.current_loop.minor_loop import NUMBERS
 
+LOG_FIELD = "ERROR LOG"
+"""The log's name in a snapshot."""
+LOG_NUMBERS = 10
+"""How many numbers ``ErrorLog.flatten`` returns."""
+_LOG = StateField(LOG_FIELD, DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
+
 
 @dataclass(frozen=True)
 class LogEntry:
@@ -95,15 +101,6 @@ class ErrorLog:
         triples = [numbers[start : start + 3] for start in (1, 4, 7)]
         entries = [LogEntry(*triple) if triple[1] else None for triple in triples]
         self.first, self.second, self.last = entries
-
-
-LOG_FIELD = "ERROR LOG"
-"""The log's name in a snapshot."""
-LOG_NUMBERS = 10
-"""How many numbers ``ErrorLog.flatten`` returns."""
-
-
-_LOG = StateField(LOG_FIELD, DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
 
 
 def snapshot_layout(compiled: CompiledTask) -> Layout:

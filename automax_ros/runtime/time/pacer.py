@@ -36,6 +36,19 @@ BREATH_S, BREATH_PERIOD_NS = 0.0001, 2 * NS_PER_MS
 """How long (s), and how often (ns of the wall clock), a pacer that never waits gives other threads time."""
 
 
+LONGEST_WAIT_NS = 50 * NS_PER_MS
+"""The loop wakes at least this often, so that it responds to signals at once."""
+START_LEAD_NS = 50 * NS_PER_MS
+"""The start is this far ahead of ``begin``, so that no scan misses its deadline because of presets and start-up."""
+CHORE_PERIOD_NS = 100 * NS_PER_MS
+"""How often the loop calls ``on_idle``."""
+CHORE_ROOM_NS = 2 * NS_PER_MS
+"""``on_idle`` is delayed, by another period at most, while the next event is nearer than this."""
+WALL_CLOCK: Callable[[], int] = time.monotonic_ns
+WALL_WAIT: Callable[[float], object] = time.sleep
+"""The wall clock, for pacers that keep another time but must respond to the user meanwhile."""
+
+
 class Pace(Protocol):
     """Advances the time of one scheduler."""
 
@@ -86,19 +99,6 @@ def by_steps(
         if pause_s > 0 or now >= next_breath:
             wait(max(pause_s, BREATH_S))
             next_breath = wall() + BREATH_PERIOD_NS
-
-
-LONGEST_WAIT_NS = 50 * NS_PER_MS
-"""The loop wakes at least this often, so that it responds to signals at once."""
-START_LEAD_NS = 50 * NS_PER_MS
-"""The start is this far ahead of ``begin``, so that no scan misses its deadline because of presets and start-up."""
-CHORE_PERIOD_NS = 100 * NS_PER_MS
-"""How often the loop calls ``on_idle``."""
-CHORE_ROOM_NS = 2 * NS_PER_MS
-"""``on_idle`` is delayed, by another period at most, while the next event is nearer than this."""
-WALL_CLOCK: Callable[[], int] = time.monotonic_ns
-WALL_WAIT: Callable[[float], object] = time.sleep
-"""The wall clock, for pacers that keep another time but must respond to the user meanwhile."""
 
 
 class Pacer:

@@ -18,6 +18,12 @@ Real = npt.NDArray[np.float64]
 Column = npt.NDArray[np.int64] | npt.NDArray[np.float64]
 
 
+_FULL = 4
+"""AUTOMAX_FULL: the room for errors or writes is used up."""
+_ROOM = 4
+"""Initial room for errors and writes per scan; the call is repeated with more where that is not enough."""
+
+
 @dataclass(frozen=True)
 class BesideLatch:
     """The reads and writes of scans in actual memory: scan k has the rows ``offsets[k]`` to ``offsets[k + 1]``.
@@ -62,12 +68,6 @@ class Executed:
     outputs: list[Column]
     errors: Whole
     written: Written
-
-
-_FULL = 4
-"""AUTOMAX_FULL: the room for errors or writes is used up."""
-_ROOM = 4
-"""Initial room for errors and writes per scan; the call is repeated with more where that is not enough."""
 
 
 class _Rows(ctypes.Structure):

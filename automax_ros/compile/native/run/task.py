@@ -38,6 +38,11 @@ _TRANSLATOR = (installation().sources, sys.implementation.cache_tag, *fixed_part
 """The translator's sources: read when this module is loaded, like the other modules, so that they match what runs."""
 
 
+_HOST = "automax_host"
+_HOST_TEXTS = ("abi.h", "host/values.c", "host/touch.c", "host/state.c", "host/scans.c", "host/library.c")
+"""The files that make up the host, in their order."""
+
+
 def kept_translation(compiled: CompiledTask, cache: NativeCache, *, builds: bool = True) -> NativeSource:
     """Return the C of a task's scans, as ``translate`` does: from the cache, or, if ``builds``, translated and cached.
 
@@ -89,11 +94,6 @@ def _packed(source: NativeSource) -> bytes:
 def _unpacked(content: bytes) -> NativeSource:
     name, text, limits = json.loads(zlib.decompress(content))
     return NativeSource(name, text, tuple((low, high) for low, high in limits))
-
-
-_HOST = "automax_host"
-_HOST_TEXTS = ("abi.h", "host/values.c", "host/touch.c", "host/state.c", "host/scans.c", "host/library.c")
-"""The files that make up the host, in their order."""
 
 
 class NativeTask:

@@ -15,6 +15,14 @@ from automax_ros.compile.native.translate.environment import Environment
 from automax_ros.compile.native.translate.ranges import Kind, Range, span
 from automax_ros.compile.native.translate.typed import WIDE, Typed, bare, c_type, literal, whole_text
 
+_PINNED_FROM, _PINNED = 2**33, 2**40
+"""A block's integer whose range keeps growing past the first is assumed to stay within the second (decision): no block
+of the manual keeps more than 32 bits. The code checks it, and ends the scan with an error where it is not true."""
+Member = Callable[["Frame", ast.Call, Environment], list[Typed]]
+"""Translates a call of ``io``."""
+Caller = Callable[["Frame", object, ast.Call, Environment], list[Typed]]
+"""Translates a call of a Python function."""
+
 
 @dataclass
 class Unit:
@@ -65,16 +73,6 @@ class Array:
 
     place: str
     size: int
-
-
-_PINNED_FROM, _PINNED = 2**33, 2**40
-"""A block's integer whose range keeps growing past the first is assumed to stay within the second (decision): no block
-of the manual keeps more than 32 bits. The code checks it, and ends the scan with an error where it is not true."""
-Member = Callable[["Frame", ast.Call, Environment], list[Typed]]
-"""Translates a call of ``io``."""
-
-Caller = Callable[["Frame", object, ast.Call, Environment], list[Typed]]
-"""Translates a call of a Python function."""
 
 
 @dataclass

@@ -23,6 +23,10 @@ from automax_ros.compile.native.translate.typed import Typed, bare
 CarryOut = Callable[[ast.stmt, Environment], Environment | None]
 
 
+CHANGES = "changes"
+"""The list that END of the Python form fills; in C the host compares the outputs of a scan with the latched values."""
+
+
 @dataclass(frozen=True)
 class _Came:
     """What a statement depended on, and its result: lines, locals, names that it set, ranges that it changed."""
@@ -98,10 +102,6 @@ def _changed(known: Environment, changes: list[tuple[str, Range | None]]) -> Env
         if left is not None:
             after[name] = left
     return after
-
-
-CHANGES = "changes"
-"""The list that END of the Python form fills; in C the host compares the outputs of a scan with the latched values."""
 
 
 class ScanBody(Body):

@@ -29,6 +29,10 @@ from automax_ros.language.checks.rules.task_layout import TaskLayout
 from automax_ros.language.program import CommonSpec, Symbol, TuningLimits
 from automax_ros.language.tree.tree import Declaration, Declared, Event, Expression, Scope
 
+MAX_TASK_ELEMENTS = 4_000_000
+"""Most values that the variables and blocks of a task hold together (decision: a bound on memory for any source)."""
+MAX_TIMEOUT = 32767
+
 
 def tuning_limits(context: Context, scope: Scope, declared: Declared) -> TuningLimits | None:
     """Return the tuning of a declared tunable; report a bracket at fault and return None.
@@ -89,11 +93,6 @@ def _value(context: Context, declared: Declared, key: str, expression: Expressio
         context.report("AMX2007", message, expression.span, hex_hint(expression, kind))
         return None
     return stored_real(float(value))[0] if kind is DataType.REAL else value
-
-
-MAX_TASK_ELEMENTS = 4_000_000
-"""Most values that the variables and blocks of a task hold together (decision: a bound on memory for any source)."""
-MAX_TIMEOUT = 32767
 
 
 def check_declarations(context: Context, layout: TaskLayout) -> None:

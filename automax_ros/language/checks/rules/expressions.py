@@ -38,6 +38,31 @@ from automax_ros.language.tree.tree import (
     Unary,
 )
 
+_SMALLEST = 5e-324
+_BITS = (1, 0, 15, "bits 0 to 15")
+_PLACES = (1, 0, 15, "0 to 15 places")
+_RANGES: dict[str, tuple[int, float, float, str]] = {
+    "SQRT": (0, 0, inf, "0 or more"),
+    "LN": (0, _SMALLEST, inf, "more than 0"),
+    "CHR$": (0, 0, 255, "0 to 255"),
+    "BIT_SET%": _BITS,
+    "BIT_CLR%": _BITS,
+    "BIT_TST@": (1, 0, 31, "bits 0 to 31"),
+    "SHIFTL%": _PLACES,
+    "SHIFTR%": _PLACES,
+    "ROTATEL%": _PLACES,
+    "ROTATER%": _PLACES,
+}
+"""Functions with a limited argument: its place, its limits, and these in words (see ``tree/functions``)."""
+_WORDS = {Argument.NUMBER: "a number", Argument.INTEGER: "an integer", Argument.STRING: "a string"}
+_HEXADECIMAL = re.compile(r"[A-F][0-9A-F]{0,7}H")
+"""A name that looks like a hexadecimal constant without its leading 0."""
+_LITERAL_TYPES: dict[type, DataType] = {
+    RealLiteral: DataType.REAL,
+    StringLiteral: DataType.STRING,
+    BooleanLiteral: DataType.BOOLEAN,
+}
+
 
 def check_function(context: Context, call: FunctionCall, types: list[DataType | None]) -> DataType | None:
     """Report the faults of a call whose arguments have these types, and return the type of its value."""
@@ -84,29 +109,6 @@ def _count(function: Function) -> str:
     return "no arguments" if least == 0 else "1 argument" if least == 1 else f"{least} arguments"
 
 
-_SMALLEST = 5e-324
-_BITS = (1, 0, 15, "bits 0 to 15")
-_PLACES = (1, 0, 15, "0 to 15 places")
-_RANGES: dict[str, tuple[int, float, float, str]] = {
-    "SQRT": (0, 0, inf, "0 or more"),
-    "LN": (0, _SMALLEST, inf, "more than 0"),
-    "CHR$": (0, 0, 255, "0 to 255"),
-    "BIT_SET%": _BITS,
-    "BIT_CLR%": _BITS,
-    "BIT_TST@": (1, 0, 31, "bits 0 to 31"),
-    "SHIFTL%": _PLACES,
-    "SHIFTR%": _PLACES,
-    "ROTATEL%": _PLACES,
-    "ROTATER%": _PLACES,
-}
-"""Functions with a limited argument: its place, its limits, and these in words (see ``tree/functions``)."""
-_WORDS = {Argument.NUMBER: "a number", Argument.INTEGER: "an integer", Argument.STRING: "a string"}
-
-
-_HEXADECIMAL = re.compile(r"[A-F][0-9A-F]{0,7}H")
-"""A name that looks like a hexadecimal constant without its leading 0."""
-
-
 def check_expression(context: Context, expression: Expression) -> DataType | None:
     """Report the faults of an expression and return its type."""
     if isinstance(expression, Binary):
@@ -121,13 +123,6 @@ def check_expression(context: Context, expression: Expression) -> DataType | Non
         types = [check_expression(context, argument) for argument in expression.arguments]
         return check_function(context, expression, types)
     return _LITERAL_TYPES[type(expression)]
-
-
-_LITERAL_TYPES: dict[type, DataType] = {
-    RealLiteral: DataType.REAL,
-    StringLiteral: DataType.STRING,
-    BooleanLiteral: DataType.BOOLEAN,
-}
 
 
 def _report_structure(context: Context, target: Reference | Element) -> None:
