@@ -22,7 +22,7 @@ def forward_operator(nodes: Sequence[ModuleNode], bus: DistributedMemory) -> Ope
     memory = next((node for node in nodes if isinstance(node, CommonMemoryNode)), None)
     for node in nodes:
         if isinstance(node, OperatorNode) and memory is not None:
-            node.desk.forward_by = RequestForwarder(node, bus, memory.offer_files)
+            node.operator_services.forward_by = RequestForwarder(node, bus, memory.offer_files)
     if rack.part.holds_common_memory or not rack.config.operator:
         return None
     return OperatorServices(nodes[0], partial(operate_name, part_name(rack.config, rack.part.slots)))

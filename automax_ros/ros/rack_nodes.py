@@ -133,9 +133,9 @@ class RackNodes:
             raise RosArgumentsError(_TOGETHER, "leave out use_sim_time, or run the rack in one process")
         self._clock = RackClock(self.rack.scheduler, turns, follows=follows, simulated=simulated)
         self._pacer = self._clock.pace
-        self._door = MessageIntake(self._report)
+        self._intake = MessageIntake(self._report)
         self._site = RackContext(
-            self.rack, self.stream, self._pacer, self._context, self.health, self._door, arguments, lock=turns
+            self.rack, self.stream, self._pacer, self._context, self.health, self._intake, arguments, lock=turns
         )
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
@@ -145,7 +145,7 @@ class RackNodes:
             manager = RackNode(
                 self.rack.config.namespace, self._context, self.health, RackLifecycle(self), self._enter, arguments
             )
-            manager.served_by(self._door)
+            manager.served_by(self._intake)
             manager.follow(INACTIVE)
             self._own = (manager,)
         self.manager = manager
@@ -184,7 +184,7 @@ class RackNodes:
         self._executor = executor
         for node in (*self.nodes, *self._own):
             executor.add_node(node)
-        self._door.open()
+        self._intake.open()
 
     def start(
         self,
@@ -202,7 +202,7 @@ class RackNodes:
             first: called before tasks run; not in a rack that already runs in other processes.
             paced: whether a thread scans from then on; without one, ``run`` does.
         """
-        self._door.open()
+        self._intake.open()
         self._to_begin = (settings, first)
         if self._clock.is_there:
             self._begin()
@@ -239,8 +239,10 @@ class RackNodes:
         """
         operator = next((node for node in self.nodes if isinstance(node, OperatorNode)), None)
         if self.bus is not None and operator is not None:
-            desk = operator.desk
-            return Pending(lambda done: desk.run_everywhere(lambda why: done(TransitionRefused(why) if why else None)))
+            services = operator.operator_services
+            return Pending(
+                lambda done: services.run_everywhere(lambda why: done(TransitionRefused(why) if why else None))
+            )
         with self._site.between_scans():
             self.rack.operations.run_all()
         return None
@@ -305,7 +307,7 @@ class RackNodes:
         self._closed = True
         if self._thread is not None:
             self._thread.join()
-        self._door.stop()
+        self._intake.stop()
         with self._site.lock:
             if self.bus is not None:
                 self.bus.leave()
@@ -319,7 +321,7 @@ class RackNodes:
             take_out(self._executor, nodes, spun=spun)
         for node in nodes:
             node.destroy_node()
-        self._door.close()
+        self._intake.close()
 
     def _send_last(self) -> None:
         try:

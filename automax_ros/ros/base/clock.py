@@ -79,7 +79,7 @@ class RackClock:
         elif self._follower is not None:
             subscription = node.own_subscription(message_class(_TYPE), CLOCK, ros_qos(_HEARD))
             self._topic = subscription.topic_name
-            site.door.add(TopicReader(subscription, _MOST_BYTES, lambda taken: self._hear(taken.payload)), last=True)
+            site.intake.add(TopicReader(subscription, _MOST_BYTES, lambda taken: self._hear(taken.payload)), last=True)
 
     def wait(self, should_stop: Callable[[], bool], on_idle: Callable[[int], None] | None = None) -> bool:
         """Wait until the rack can start; return False if asked to stop. ``on_idle`` gets rack time meanwhile, 0."""

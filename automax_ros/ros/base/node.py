@@ -51,7 +51,7 @@ _OF_RCLPY = (SIM_TIME, "start_type_description_service")
 class RackRosNode(Node):  # type: ignore[misc]
     """A node whose services created by rclpy are guarded."""
 
-    _door: MessageIntake | None = None
+    _intake: MessageIntake | None = None
 
     def __init__(
         self, name: str, namespace: str, context: Context, health: Health, arguments: RosArguments = NO_ARGUMENTS
@@ -86,22 +86,22 @@ class RackRosNode(Node):  # type: ignore[misc]
                 return SetParametersResult(successful=False, reason=f"{reason}: {hint}" if hint else reason)
         return super().set_parameters_atomically(parameter_list)
 
-    def served_by(self, door: MessageIntake) -> None:
+    def served_by(self, intake: MessageIntake) -> None:
         """Receive requests through a message intake, also for services created later.
 
         Call it before an executor has the node. Where rcl is not found the executor serves requests, as usual.
         """
-        self._door = door
+        self._intake = intake
         self.adopt_services()
 
     def adopt_services(self) -> None:
         """Add the services that rclpy has created since to the message intake, if there is one."""
         rcl = library()
-        if rcl is None or self._door is None:
+        if rcl is None or self._intake is None:
             return
         for service in self.services:
             self._adopted.add(service)
-            self._door.add(ServiceRequests(rcl, service, partial(self.guard.refusal, service.srv_name)))
+            self._intake.add(ServiceRequests(rcl, service, partial(self.guard.refusal, service.srv_name)))
 
     @property
     def services(self) -> Iterator[Any]:
@@ -147,7 +147,7 @@ class RackContext:
         pacer: keeps its time.
         context: rclpy's context of all nodes.
         health: counts the problems that they report.
-        door: receives messages and requests.
+        intake: receives messages and requests.
         arguments: their ROS arguments from the command line.
         diagnostics: publishes their health.
         lock: held by the thread that accesses the rack; one at a time, between scans.
@@ -158,7 +158,7 @@ class RackContext:
     pacer: Pace
     context: Context
     health: Health
-    door: MessageIntake
+    intake: MessageIntake
     arguments: RosArguments = NO_ARGUMENTS
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     lock: RackLock = field(default_factory=RackLock)
@@ -183,7 +183,7 @@ class ModuleNode(RackRosNode):
         """Join the graph."""
         super().__init__(name, site.rack.config.namespace, site.context, site.health, site.arguments)
         self.site = site
-        self.served_by(site.door)
+        self.served_by(site.intake)
 
     @property
     def subscriptions(self) -> Iterator[Any]:

@@ -70,7 +70,7 @@ class WriteTopic:
     def _subscribe(self, qos: QosProfile, events: SubscriptionEventCallbacks | None) -> None:
         subscription = self._node.own_subscription(self._class, self._topic, ros_qos(qos), events)
         receive = partial(self.receive, reliable=qos is COMMAND)
-        self._node.site.door.add(TopicReader(subscription, self._most_bytes, receive))
+        self._node.site.intake.add(TopicReader(subscription, self._most_bytes, receive))
 
     def _not_heard(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
         if info.last_policy_kind != QoSPolicyKind.RELIABILITY:

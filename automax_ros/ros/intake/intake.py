@@ -95,7 +95,7 @@ class MessageIntake:
     def open(self) -> None:
         """Start the thread; a second call does nothing."""
         if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="door", daemon=True)
+            self._thread = threading.Thread(target=self._run, name="intake", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:

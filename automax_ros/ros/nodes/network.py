@@ -55,7 +55,7 @@ class NetworkNode(ModuleNode):
         self._publish = self.outlet(Topic(name, TYPE, NETWORK, self._slot))
         subscription = self.own_subscription(message_class(TYPE), name, ros_qos(NETWORK))
         # Messages wait for the next cycle; b"" replaces one that is too long.
-        site.door.add(TopicReader(subscription, MOST_BYTES, lambda taken: self._waiting.append(taken.payload or b"")))
+        site.intake.add(TopicReader(subscription, MOST_BYTES, lambda taken: self._waiting.append(taken.payload or b"")))
         module.connect(self._send)
         scheduler, key = site.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
         scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._look())

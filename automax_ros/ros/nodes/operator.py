@@ -291,9 +291,9 @@ class OperatorNode(ModuleNode):
     def __init__(self, site: RackContext) -> None:
         """Create the services."""
         super().__init__(site, "operator")
-        self.desk = OperatorServices(self)
+        self.operator_services = OperatorServices(self)
 
     def destroy_node(self) -> None:
         """Leave the graph; a source that is being compiled is not installed."""
-        self.desk.close()
+        self.operator_services.close()
         super().destroy_node()

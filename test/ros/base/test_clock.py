@@ -306,8 +306,8 @@ def test_what_has_come_before_the_clock_is_taken_before_it(monkeypatch):
     """Writes in any number come first; those that come later wait for the next message of the clock at most."""
     log: list[tuple[str, int]] = []
     write, clock = Way("write", log, range(10)), Way("clock", log, [100, 101])
-    door = MessageIntake(lambda what, error: pytest.fail(f"{what}: {error}"))
-    door._last = clock
+    intake = MessageIntake(lambda what, error: pytest.fail(f"{what}: {error}"))
+    intake._last = clock
     looks = iter([[clock, write]])
 
     def woken(_):
@@ -315,26 +315,26 @@ def test_what_has_come_before_the_clock_is_taken_before_it(monkeypatch):
             write.messages.append(10)
             return [write]
         if ("clock", 101) in log:
-            door._closing = True
+            intake._closing = True
         return next(looks, [])
 
-    monkeypatch.setattr(door, "_woken", woken)
-    door._run()
+    monkeypatch.setattr(intake, "_woken", woken)
+    intake._run()
     assert log == [*(("write", number) for number in range(10)), ("clock", 100), ("write", 10), ("clock", 101)]
 
 
 def test_flood_of_writes_does_not_stop_the_clock(monkeypatch):
     log: list[tuple[str, int]] = []
     write, clock = Way("write", log, range(100_000)), Way("clock", log, [1, 2, 3])
-    door = MessageIntake(lambda what, error: pytest.fail(f"{what}: {error}"))
-    door._last = clock
+    intake = MessageIntake(lambda what, error: pytest.fail(f"{what}: {error}"))
+    intake._last = clock
     monkeypatch.setattr("automax_ros.ros.intake.intake.time.sleep", lambda _: None)
 
     def woken(_):
-        door._closing = not clock.messages
+        intake._closing = not clock.messages
         return [clock, write]
 
-    monkeypatch.setattr(door, "_woken", woken)
-    door._run()
+    monkeypatch.setattr(intake, "_woken", woken)
+    intake._run()
     at = [place for place, (name, _) in enumerate(log) if name == "clock"]
     assert at == [number * (MOST_ROUNDS_FIRST * MOST_OF_ONE + 1) - 1 for number in (1, 2, 3)]

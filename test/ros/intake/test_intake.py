@@ -31,7 +31,7 @@ class Way:
 
 
 @pytest.fixture
-def door(monkeypatch):
+def intake(monkeypatch):
     """A door that looks by itself, as where rcl is not found."""
     monkeypatch.setattr(door_module, "library", lambda: None)
     reports = []
@@ -41,58 +41,58 @@ def door(monkeypatch):
     made.close()
 
 
-def test_everything_is_taken(door):
+def test_everything_is_taken(intake):
     taken = []
     ways = [Way(name, 50, taken) for name in "ABC"]
     for way in ways:
-        door.add(way)
-    door.open()
+        intake.add(way)
+    intake.open()
     wait_until(lambda: len(taken) == 150)
     assert not any(way.waiting for way in ways)
 
 
-def test_round_takes_a_stated_number_and_each_gets_its_turn(door):
+def test_round_takes_a_stated_number_and_each_gets_its_turn(intake):
     taken = []
     ready = deque(Way(name, 100, taken) for name in "ABCDEF")
-    door._round(ready)
+    intake._round(ready)
     assert len(taken) == MOST_A_ROUND
     assert [sum(name == letter for name, _ in taken) for letter in "ABCDEF"] == [MOST_OF_ONE] * 4 + [0, 0]
-    door._round(ready)
+    intake._round(ready)
     assert [sum(name == letter for name, _ in taken) for letter in "EF"] == [MOST_OF_ONE] * 2
     assert len(taken) == 2 * MOST_A_ROUND
 
 
-def test_an_entrance_with_a_share_of_its_own_takes_nothing_from_the_others(door):
+def test_an_entrance_with_a_share_of_its_own_takes_nothing_from_the_others(intake):
     taken = []
     own, *others = ways = [Way(name, 100, taken) for name in "ABCDEF"]
-    door.add(own, share=32)
-    door._round(deque(ways))
+    intake.add(own, share=32)
+    intake._round(deque(ways))
     assert [sum(name == letter for name, _ in taken) for letter in "ABCDEF"] == [32] + [MOST_OF_ONE] * 4 + [0]
-    door._remove(own)
+    intake._remove(own)
     taken.clear()
-    door._round(deque([own, *others]))
+    intake._round(deque([own, *others]))
     assert sum(name == "A" for name, _ in taken) == MOST_OF_ONE
 
 
-def test_pace_is_bounded(door):
+def test_pace_is_bounded(intake):
     """However much waits: a round of at most 16, then a rest of a millisecond."""
     taken = []
-    door.add(Way("FLOOD", 10**9, taken))
-    door.open()
+    intake.add(Way("FLOOD", 10**9, taken))
+    intake.open()
     began = time.monotonic()
     wait_until(lambda: len(taken) > 100)
-    door.stop()
+    intake.stop()
     assert len(taken) <= (time.monotonic() - began) * 1000 * MOST_OF_ONE + MOST_A_ROUND
 
 
-def test_failure_is_told_and_the_others_go_on(door):
+def test_failure_is_told_and_the_others_go_on(intake):
     taken = []
-    door.add(Way("BAD", 10, taken, fail_at=(3, 7)))
-    door.add(Way("GOOD", 10, taken))
-    door.open()
+    intake.add(Way("BAD", 10, taken, fail_at=(3, 7)))
+    intake.add(Way("GOOD", 10, taken))
+    intake.open()
     wait_until(lambda: len(taken) == 20)
-    wait_until(lambda: len(door.reports) == 2)
-    assert [what for what, _ in door.reports] == ["BAD: dropped"] * 2
+    wait_until(lambda: len(intake.reports) == 2)
+    assert [what for what, _ in intake.reports] == ["BAD: dropped"] * 2
 
 
 def test_senders_tell_copies_and_what_is_missing():
