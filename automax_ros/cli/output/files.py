@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from automax_ros.cli.usage import UsageError
-from automax_ros.recordings.mcap.whole_file import atomic_write, held_open, is_direct, open_at_once
+from automax_ros.core.safe_file import atomic_write, held_open, is_direct, open_at_once
 
 
 @contextmanager

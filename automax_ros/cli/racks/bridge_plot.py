@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.cli.usage import UsageError
+from automax_ros.core.safe_file import atomic_write
 from automax_ros.drive.circuit.scr import FORWARD, PHASES, REVERSE, phase_of
 from automax_ros.drive.circuit.steady import BridgeCase, Moment, SteadyState, waveforms
-from automax_ros.recordings.mcap.whole_file import atomic_write
 
 _COLOURS = ("#c1272d", "#2e7d32", "#1f4e9c")
 
