@@ -83,7 +83,7 @@ class RepairReport:
         """The stamp of the start of the run, or of the first message without a VariableTable."""
         filled = [file.contents for file in self.files if file.contents.messages]
         told = [item.run_start for item in filled if item.run_start is not None]
-        return told[0] if told else min((item.first_stamp for item in filled), default=0)
+        return told[0] if told else min((item.began for item in filled), default=0)
 
 
 def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float], None] | None = None) -> RepairReport:
