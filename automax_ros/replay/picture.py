@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.core.names import element
+from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
 from automax_ros.messages.types.messages import Scan
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.whole_file import atomic_write
 from automax_ros.recordings.read.common_log import Key
 from automax_ros.replay.engine import Replay
 from automax_ros.replay.scans.commons import UnknownValue

@@ -13,7 +13,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 import numpy as np
 import numpy.typing as npt
 
-from automax_ros.recordings.mcap.whole_file import atomic_write, open_at_once
+from automax_ros.core.safe_file import atomic_write, open_at_once
 from automax_ros.sweep.run import Plan
 from automax_ros.sweep.sweeping import Row
 

@@ -1,17 +1,16 @@
-"""A file that is replaced is the old one or the new one, wherever the machine stops."""
+"""A file that is replaced is the old one or the new one, wherever the machine stops; links and permissions stay."""
 
 import contextlib
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
 import pytest
 
 from automax_ros.core import safe_file
-from automax_ros.core.safe_file import replace_file
+from automax_ros.core.safe_file import atomic_write, replace_file
 
 OLD, NEW = b"old" * 1000, b"new" * 2000
 
@@ -68,7 +67,6 @@ def machine(monkeypatch):
         for name in ("fsync", "replace", "unlink", "open"):
             monkeypatch.setattr(safe_file.os, name, found.call(name, getattr(os, name)))
         monkeypatch.setattr(safe_file.os, "fdopen", lambda descriptor, _: File(found, descriptor))
-        monkeypatch.setattr(safe_file.tempfile, "mkstemp", found.call("mkstemp", tempfile.mkstemp))
         return found
 
     yield made
@@ -79,8 +77,9 @@ def test_whole_and_durable_in_this_order(tmp_path, machine):
     path = tmp_path / "state.json"
     running = machine(100)
     replace_file(path, NEW)
-    assert running.calls == ["mkstemp", "open", "write", "write", "fsync", "replace", "open", "fsync"]
+    assert running.calls == ["open", "open", "write", "write", "fsync", "replace", "open", "fsync"]
     assert path.read_bytes() == NEW
+    assert path.stat().st_mode & 0o777 == 0o600, "for its owner alone"
 
 
 @pytest.mark.parametrize("lives", range(9))
@@ -142,3 +141,40 @@ def test_a_killed_writer_leaves_a_whole_file(tmp_path):
         data = path.read_bytes()
         assert len(data) == 300_000
         assert len(set(data)) == 1
+
+
+def test_the_file_appears_at_the_end_with_its_suffix(tmp_path: Path) -> None:
+    output = tmp_path / "OUT.svg"
+    with atomic_write(output) as place:
+        assert (place.parent, place.suffix, place != output) == (tmp_path, ".svg", True)
+        place.write_text("whole")
+        assert not output.exists()
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("OUT.svg", "whole")]
+
+
+def test_links_and_permissions_stay(tmp_path: Path) -> None:
+    target = tmp_path / "there" / "real.csv"
+    target.parent.mkdir()
+    target.write_text("old")
+    target.chmod(0o640)
+    link = tmp_path / "link.csv"
+    link.symlink_to(target)
+    with atomic_write(link) as place:
+        place.write_text("new")
+    assert link.is_symlink()
+    assert (target.read_text(), target.stat().st_mode & 0o777) == ("new", 0o640)
+    with atomic_write(tmp_path / "fresh.csv") as place:
+        place.write_text("new")
+    with (tmp_path / "usual").open("w"):
+        pass
+    assert (tmp_path / "fresh.csv").stat().st_mode == (tmp_path / "usual").stat().st_mode
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everything")
+def test_a_file_that_must_not_be_written_is_not_replaced(tmp_path: Path) -> None:
+    output = tmp_path / "OUT.csv"
+    output.write_text("old")
+    output.chmod(0o444)
+    with pytest.raises(PermissionError), atomic_write(output):
+        pass
+    assert output.read_text() == "old"

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import printable
 from automax_ros.core.types import DataType
 from automax_ros.core.user_error import UsageError
-from automax_ros.recordings.mcap.whole_file import atomic_write
 from automax_ros.recordings.tables.traces import ErrorMark, Line, Role, Traces, thinned
 
 DPI = 120

@@ -10,8 +10,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
+from automax_ros.core.safe_file import atomic_write, held_open, is_direct, open_at_once
 from automax_ros.core.user_error import UsageError
-from automax_ros.recordings.mcap.whole_file import atomic_write, held_open, is_direct, open_at_once
 
 PICTURE_FORMATS = (".png", ".svg", ".pdf")
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.user_error import UsageError
 from automax_ros.drive.circuit.scr import FORWARD, PHASES, REVERSE, phase_of
 from automax_ros.drive.circuit.steady import BridgeCase, Moment, SteadyState, waveforms
-from automax_ros.recordings.mcap.whole_file import atomic_write
 
 _COLOURS = ("#c1272d", "#2e7d32", "#1f4e9c")
 

@@ -15,13 +15,13 @@ from automax_ros.cli.options.rack import DEFAULT_RACK_FILE
 from automax_ros.cli.options.task import is_rack_file, tick_option
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import count_of, quoted
 from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.checks.tasks import findings_by_task, with_findings
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.processor import MAX_PROCESSORS
 from automax_ros.rackfile.old_plants.draft import Draft, DraftFault, draft
-from automax_ros.recordings.mcap.whole_file import atomic_write
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -65,7 +65,7 @@ def as_data(info: BagInfo, facts: dict[str, TaskFacts], *, checked: bool) -> dic
         "run_id": f"{table.run_id:016x}" if table else None,
         "clock": _clock(info),
         "run_s": _run_s(info),
-        "stamps_ns": [info.first_stamp, info.last_stamp],
+        "stamps_ns": [info.first_stamp, info.last_stamp] if info.messages else [None, None],
         "start": _time_of_day(info.first_stamp),
         "end": _time_of_day(info.last_stamp),
         "duration_s": info.duration_ns / NS_PER_S,
@@ -161,12 +161,12 @@ def _clock(info: BagInfo) -> str | None:
 
 def _run_s(info: BagInfo) -> list[float] | None:
     """Return begin and end of the recorded part, in seconds from the start of the run."""
-    if info.table is None or info.first_stamp is None or info.last_stamp is None:
+    if info.table is None:
         return None
     return [(stamp - info.table.stamp) / NS_PER_S for stamp in (info.first_stamp, info.last_stamp)]
 
 
-def _time_of_day(stamp: int | None) -> str | None:
-    if stamp is None or stamp < _WALL_CLOCK_NS or stamp >= 2**31 * NS_PER_S:
+def _time_of_day(stamp: int) -> str | None:
+    if not _WALL_CLOCK_NS <= stamp < 2**31 * NS_PER_S:
         return None
     return datetime.fromtimestamp(stamp // NS_PER_S, timezone.utc).strftime("%Y-%m-%d %H:%M:%S UTC")

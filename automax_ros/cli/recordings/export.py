@@ -19,9 +19,9 @@ from automax_ros.cli.options.values import (
 )
 from automax_ros.cli.output.screen import share_shown
 from automax_ros.cli.output.signals import ended_by_signals
+from automax_ros.core.safe_file import is_direct
 from automax_ros.core.text import count_of
 from automax_ros.core.user_error import UsageError
-from automax_ros.recordings.mcap.whole_file import is_direct
 from automax_ros.recordings.tables.export import CommonTable, Table, require_another_file, write_csv
 from automax_ros.recordings.tables.scan_table import ScanTable
 from automax_ros.recordings.tables.series import Progress

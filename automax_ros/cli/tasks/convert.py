@@ -15,11 +15,11 @@ from pathlib import Path
 
 from automax_ros.cli.options.task import Target, add_target_arguments, check_text, require_task, target_of
 from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.old_plants.sources import Converted, convert
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
-from automax_ros.recordings.mcap.whole_file import atomic_write
 
 KEPT_SUFFIX = ".orig"
 """Suffix that --write appends to the name of the old file."""

@@ -7,8 +7,8 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.user_error import UsageError
-from automax_ros.recordings.mcap.whole_file import atomic_write
 from automax_ros.tuning.frequency import decibels, logarithmic
 from automax_ros.tuning.response import BlockResponse, Point, followed
 

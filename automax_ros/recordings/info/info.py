@@ -29,6 +29,7 @@ from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT
 from automax_ros.recordings.read.common_log import variables_of
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.soundness import verdict_of
+from automax_ros.recordings.read.tally import Tally
 from automax_ros.recordings.tables.series import Progress
 
 MOST_KEPT = 1000
@@ -44,14 +45,6 @@ _NO_ERRORS = bytes(4)
 _PROGRESS_MASK = 0x3FF
 _NUMBER = re.compile(r"(\d{1,9})(?=\.mcap$)")
 REPAIR_HINT = "`automax bag repair` makes a whole recording of what is readable"
-
-
-@dataclass
-class TopicInfo:
-    """A topic: the type and the number of its messages."""
-
-    type_name: str
-    messages: int = 0
 
 
 @dataclass
@@ -105,8 +98,8 @@ class AttachmentInfo:
 
 
 @dataclass
-class BagInfo:
-    """The contents of a recording. Stamps are nanoseconds; ``problems`` is empty if it is sound.
+class BagInfo(Tally):
+    """The contents of a recording; ``problems`` is empty if it is sound.
 
     ``texts`` are the rack's file and the sources of its tasks as stored inside. ``gaps`` lists missing writes, if they
     were checked.
@@ -115,10 +108,6 @@ class BagInfo:
     path: Path
     custom_data: dict[str, str] = field(default_factory=dict)
     table: VariableTable | None = None
-    first_stamp: int | None = None
-    last_stamp: int | None = None
-    messages: int = 0
-    topics: dict[str, TopicInfo] = field(default_factory=dict)
     tasks: dict[str, TaskInfo] = field(default_factory=dict)
     files: list[FileInfo] = field(default_factory=list)
     operations: list[Operation] = field(default_factory=list)
@@ -138,7 +127,7 @@ class BagInfo:
     @property
     def duration_ns(self) -> int:
         """Time from the first stamp to the last."""
-        return (self.last_stamp or 0) - (self.first_stamp or 0)
+        return self.last_stamp - self.first_stamp
 
     @property
     def size(self) -> int:
@@ -191,7 +180,7 @@ def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None
             data.unpacked_bytes,
         )
         before += entry.size
-    if info.table is not None and info.first_stamp is not None and info.last_stamp is not None:
+    if info.table is not None:
         # A rack sends its files before its run begins, but the recording of a run begins with the run.
         info.first_stamp = min(max(info.first_stamp, info.table.stamp), info.last_stamp)
     if check and not info.problems:
@@ -228,17 +217,8 @@ def _with_repair(error: BagError) -> BagError:
 
 def _count(info: BagInfo, record: object) -> None:
     if isinstance(record, RawMessage):
-        info.messages += 1
-        stamp = record.publish_time
-        if info.first_stamp is None or stamp < info.first_stamp:
-            info.first_stamp = stamp
-        if info.last_stamp is None or stamp > info.last_stamp:
-            info.last_stamp = stamp
         name = record.schema.name if record.schema else ""
-        topic = info.topics.get(record.channel.topic)
-        if topic is None:
-            topic = info.topics[record.channel.topic] = TopicInfo(name)
-        topic.messages += 1
+        info.add(record.channel.topic, name, record.log_time, record.publish_time)
         if name == _SCAN:
             _count_scan(info, record)
         elif name == _OPERATION and len(info.operations) < MOST_KEPT:

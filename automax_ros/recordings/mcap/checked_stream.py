@@ -28,11 +28,8 @@ class CheckedStream:
 
     def take(self, length: int) -> bytes:
         """Return the next bytes, fewer if the file ends earlier."""
-        if self._at + length > len(self._buffer):
-            self._fill(length)
-        begin = self._at
-        self._at = min(begin + length, len(self._buffer))
-        return self._buffer[begin : self._at]
+        count = self.skip(length)
+        return self._buffer[self._at - count : self._at]
 
     def numbers(self, layout: struct.Struct) -> tuple[Any, ...]:
         """Return the numbers in the next bytes; none if the file ends earlier."""
@@ -61,6 +58,12 @@ class CheckedStream:
         begin = self._at
         self._at = min(begin + length, len(self._buffer))
         return self._at - begin
+
+    def jump(self, position: int) -> None:
+        """Continue at another position; the checksum then covers nothing."""
+        self._file.seek(position)
+        self._buffer, self._before = b"", position
+        self._at = self._summed = 0
 
     def crc(self, without: int = 0) -> int:
         """Return the CRC-32 of the bytes since ``begin_crc``, except the last ``without``, which were read at once."""

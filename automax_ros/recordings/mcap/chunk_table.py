@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from mcap.opcode import Opcode
+from mcap.records import Chunk
 from numpy.typing import NDArray
 
 from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
@@ -90,10 +91,14 @@ class ChunkTable:
 
 
 class WholeChunk:
-    """The unpacked bytes of a chunk, which ends at ``place`` in the file, and the indexes that follow it."""
+    """The unpacked bytes of a chunk, which ends at ``place`` in the file, and the indexes that follow it.
 
-    def __init__(self, data: Buffer, place: int = 0) -> None:
-        self.data, self.place = data, place
+    Of a damaged file: ``packed`` is the chunk as stored, None if ``data`` was recovered of one that the file has only
+    in part; ``cut``: there was more than that.
+    """
+
+    def __init__(self, data: Buffer, place: int = 0, packed: Chunk | None = None, *, cut: bool = False) -> None:
+        self.data, self.place, self.packed, self.cut = data, place, packed, cut
         self._indexes: list[bytes] | None = []
         self._left = len(data) // MESSAGE_HEAD * _ENTRY.itemsize
         """Most bytes that further entries can have."""

@@ -3,6 +3,10 @@
 Memory stays bounded whatever the file states: a length is compared with the limit and with the bytes available before
 anything is read or decompressed. Every checksum in the file is verified: those of chunks before their messages are
 returned, the others at the end.
+
+Reading ends at the first fault, or, to salvage a cut or damaged file, skips and notes what is not sound. Then a record
+is sound if it is complete and can be parsed; a chunk or attachment with a checksum, if the checksum is right. After a
+place where records cannot be recognized, reading continues at the next compressed chunk.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -23,22 +27,34 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Me
 from automax_ros.recordings.mcap.checked_stream import CheckedStream
 from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.recordings.mcap.chunk_table import WholeChunk
+from automax_ros.recordings.mcap.damage import Damage
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.mcap_output import MAGIC
 from automax_ros.recordings.mcap.opening import NO_BAG_HINT, opened
-from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Buffer, Room, Unpacker
+from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Room, Unpacker
 
 _FIRST_PRIVATE_OPCODE = 0x80
 """First private opcode; readers skip records that they do not know."""
 TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag repair` saves what is sound"
 
+_KNOWN = frozenset(map(int, Opcode))
+_DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
+_MESSAGE = int(Opcode.MESSAGE)
+"""A plain number: comparing with a member of an enumeration takes longer than finding a record."""
+_IN_CHUNK = _DEFINITIONS | {_MESSAGE}
+_ENDS = frozenset({int(Opcode.DATA_END), int(Opcode.FOOTER)})
 _NOTHING: frozenset[int] = frozenset()
 _INDEXES = frozenset({int(Opcode.MESSAGE_INDEX)})
-_MESSAGES = _INDEXES | {int(Opcode.CHUNK), int(Opcode.MESSAGE)}
-"""Records that may be skipped."""
-_END = -1
-"""Marks the end of the data in place of an opcode."""
+_MESSAGES = _INDEXES | {int(Opcode.CHUNK), _MESSAGE}
+_SUMMARY = frozenset(range(256)) - {int(Opcode.FOOTER)}
+"""Records that may be skipped: between the end of the data and the footer all of them."""
+_SALVAGED_SUMMARY = _KNOWN - _DEFINITIONS - _ENDS
+"""Those skipped there if the file is damaged: definitions may be lost elsewhere."""
+_END, _CUT = -1, -2
+"""In place of an opcode: the end of the data, a chunk of which the file has only a part."""
 _Record = TypeVar("_Record")
+Piece = WholeChunk | Attachment | Metadata | bytes
+"""What a file holds; bytes are the content of a message outside of chunks."""
 
 
 class RawMessage(NamedTuple):
@@ -53,17 +69,20 @@ class RawMessage(NamedTuple):
 
 
 class McapFile:
-    """One mcap file with ROS 2 messages, to be read once.
+    """One mcap file with ROS 2 messages, to be read once; with ``salvage``, ``damage`` describes what was skipped.
 
     ``chunks_read``, ``stored_bytes`` and ``unpacked_bytes`` count the chunks read so far and the bytes in them, as
-    stored and decompressed.
+    stored and decompressed; ``compressions`` are those of the chunks.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, salvage: bool = False) -> None:
         self.path = path
+        self.damage = Damage()
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
-        self._definition_bytes = 0
+        self.compressions: set[str] = set()
+        self._salvage = salvage
+        self._definition_bytes = self._size = 0
         self._stream: CheckedStream | None = None
         self._place: int | None = None
         self._unpacker = Unpacker(path, 0)
@@ -82,16 +101,25 @@ class McapFile:
         Raises:
             BagError: the file is truncated, damaged, beyond the limits or not a recording of ROS 2.
         """
-        for opcode, content in self._parts(_INDEXES if messages else _MESSAGES):
-            if opcode == Opcode.CHUNK:
-                data = self._unpacked(self._parsed(Chunk.read, content))
-                yield from self.chunk_messages(WholeChunk(data, self.position))
-            elif opcode == Opcode.MESSAGE:
-                yield self._message(content)
-            elif opcode == Opcode.ATTACHMENT:
-                yield self._parsed(Attachment.read, content)
-            elif opcode == Opcode.METADATA:
-                yield self._parsed(Metadata.read, content)
+        for piece in self.pieces(_INDEXES if messages else _MESSAGES):
+            if isinstance(piece, WholeChunk):
+                yield from self.chunk_messages(piece)
+            elif isinstance(piece, bytes):
+                yield self._message(piece)
+            else:
+                yield piece
+
+    def pieces(self, without: frozenset[int] = _INDEXES) -> Iterator[Piece]:
+        """Yield chunks, messages outside of them, attachments and metadata, except records of the kinds ``without``.
+
+        Raises:
+            BagError: as ``records`` does; a damaged file to be salvaged only if it is beyond the limits, cannot be
+                read, or is not a recording of ROS 2 at all.
+        """
+        for opcode, content in self._parts(without):
+            piece = self._piece(opcode, content)
+            if piece is not None:
+                yield piece
 
     def chunks(self, *, indexed: bool = True, room: Room | None = None) -> Iterator[WholeChunk | RawMessage]:
         """Yield the chunks, unpacked, with their indexes (if ``indexed``), and the messages outside of chunks.
@@ -107,13 +135,7 @@ class McapFile:
         while True:
             try:
                 opcode, content = next(parts, (_END, b""))
-                chunk = None
-                if opcode == Opcode.CHUNK:
-                    chunk = WholeChunk(self._unpacked(self._parsed(Chunk.read, content), room), self.position)
-                elif opcode == Opcode.ATTACHMENT:
-                    self._parsed(Attachment.read, content)
-                elif opcode == Opcode.METADATA:
-                    self._parsed(Metadata.read, content)
+                piece = self._piece(opcode, content, room)
             except BagError:
                 if pending is not None:
                     yield pending
@@ -124,7 +146,7 @@ class McapFile:
                 continue
             if pending is not None:
                 yield pending
-            pending = chunk
+            pending = piece if isinstance(piece, WholeChunk) else None
             if opcode == _END:
                 return
             if opcode == Opcode.MESSAGE:
@@ -136,69 +158,114 @@ class McapFile:
         Raises:
             BagError: the chunk is damaged or beyond the limits.
         """
-        data, position = bytes(chunk.data), 0
+        data = bytes(chunk.data)
         self._place = chunk.place
-        while position < len(data):
-            start = position + RECORD_HEAD.size
-            if start > len(data):
-                raise self._damaged("a chunk ends inside a record")
-            opcode, length = RECORD_HEAD.unpack_from(data, position)
-            position = start + length
-            if position > len(data):
-                raise self._damaged(f"a record of {length} bytes in the last {len(data) - start} bytes of a chunk")
-            if opcode == Opcode.MESSAGE:
-                yield self._message(data[start:position])
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self.define(opcode, data[start:position])
-            elif opcode < _FIRST_PRIVATE_OPCODE:
-                raise self._damaged(f"a record of kind {opcode} inside a chunk")
+        try:
+            for opcode, start, end in chunk_records(data):
+                if opcode == _MESSAGE:
+                    yield self._message(data[start:end])
+                else:
+                    self.define(opcode, data[start:end])
+        except ValueError as error:
+            raise self._damaged(str(error)) from error
         self._place = None
 
     def _parts(self, without: frozenset[int]) -> Iterator[tuple[int, bytes]]:
         """Yield opcode and content of each record of the data; check the parts around the data, add definitions."""
         with opened(self.path) as file:
-            self._unpacker = Unpacker(self.path, os.fstat(file.fileno()).st_size)
+            self._size = os.fstat(file.fileno()).st_size
+            self._unpacker = Unpacker(self.path, self._size)
             self._stream = stream = CheckedStream(file)
-            if stream.take(len(MAGIC)) != MAGIC:
-                raise BagError("AMX6810", self.path, "is not an mcap file", NO_BAG_HINT)
-            self._check_header(*self._next_record(stream))
+            magic = stream.take(len(MAGIC))
+            if magic != MAGIC:
+                if not self._salvage or not MAGIC.startswith(magic):
+                    raise BagError("AMX6810", self.path, "is not an mcap file", NO_BAG_HINT)
+                self.damage.lose(len(magic), "is empty")
+                return
+            skipped: frozenset[int] | None = None
             while True:
-                opcode, length = self._next_head(stream)
-                if opcode in without:
-                    self._skip(stream, length)
-                    stream.pass_over(RECORD_HEAD, without)
+                begin = stream.position
+                try:
+                    opcode, length = self._next_head(stream)
+                    if skipped is not None and opcode in skipped:
+                        if stream.skip(length) < length:
+                            raise self._ends_early(stream)
+                        stream.pass_over(RECORD_HEAD, skipped)
+                        continue
+                    crc = stream.crc(RECORD_HEAD.size) if opcode in _ENDS else 0
+                    content = stream.take(length)
+                    if len(content) < length:
+                        raise self._ends_early(stream)
+                except BagError:
+                    if not self._salvage:
+                        raise
+                    if begin >= self._size:
+                        return
+                    stream.jump(begin)
+                    opcode, length = stream.numbers(RECORD_HEAD) or (_END, 0)
+                    if opcode == Opcode.CHUNK and stream.position + length > self._size:
+                        yield _CUT, stream.take(MAX_RECORD_BYTES)
+                    stream.jump(self.damage.resume(file, begin, self._size))
                     continue
-                crc = stream.crc(RECORD_HEAD.size) if opcode == Opcode.DATA_END else 0
-                content = self._read(stream, length)
-                if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                if skipped is None:
+                    self._check_header(opcode, content)
+                    skipped = without
+                if opcode in _DEFINITIONS:
                     self.define(opcode, content)
-                elif opcode == Opcode.DATA_END:
-                    self._check_crc(self._parsed(DataEnd.read, content).data_section_crc, crc, "the data")
-                    break
-                elif opcode == Opcode.FOOTER:
-                    raise self._damaged("a footer without the end of the data")
-                else:
+                elif opcode not in _ENDS:
                     yield opcode, content
-            self._read_summary(stream)
+                else:
+                    if not self._salvage:
+                        self._check_end(stream, opcode, content, crc)
+                    if opcode == Opcode.FOOTER:
+                        return
+                    stream.begin_crc()
+                    self.damage.finished = True
+                    skipped = _SALVAGED_SUMMARY if self._salvage else _SUMMARY
 
-    def _read_summary(self, stream: CheckedStream) -> None:
-        """Read the section after the data, and check its checksum and its end."""
-        stream.begin_crc()
-        opcode, length = self._next_head(stream)
-        while opcode != Opcode.FOOTER:
-            self._skip(stream, length)
-            opcode, length = self._next_head(stream)
-        crc = stream.crc(RECORD_HEAD.size)
-        content = self._read(stream, length)
-        expected = self._parsed(Footer.read, content).summary_crc
-        covered = RECORD_HEAD.pack(opcode, length) + content[: -len(b"crc4")]
-        self._check_crc(expected, zlib.crc32(covered, crc), "the summary")
-        if stream.take(len(MAGIC) + 1) != MAGIC:
-            raise self._damaged("the closing mark is missing or does not end the file")
+    def _piece(self, opcode: int, content: bytes, room: Room | None = None) -> Piece | None:
+        """Return what a record holds; None for one of another kind, and for one that is skipped."""
+        if opcode == Opcode.CHUNK:
+            return self._chunk(content, room)
+        if opcode == Opcode.MESSAGE:
+            return content if len(content) >= MESSAGE_FIELDS.size or not self._salvage else None
+        if opcode == Opcode.METADATA:
+            return self._parsed(Metadata.read, content)
+        if opcode == Opcode.ATTACHMENT:
+            if not self._salvage or int.from_bytes(content[-4:], "little") in (0, zlib.crc32(content[:-4])):
+                return self._parsed(Attachment.read, content)
+            self.damage.lose(len(content), "an attachment is damaged")
+            return None
+        return self._cut_chunk(content) if opcode == _CUT else None
 
-    def _next_record(self, stream: CheckedStream) -> tuple[int, bytes]:
-        opcode, length = self._next_head(stream)
-        return opcode, self._read(stream, length)
+    def _chunk(self, content: bytes, room: Room | None) -> WholeChunk | None:
+        chunk = self._parsed(Chunk.read, content)
+        if chunk is None:
+            self.damage.lost_chunks += 1
+            return None
+        try:
+            data = self._unpacker.unpacked(chunk, room)
+        except BagError as error:
+            if not self._salvage:
+                text = f"{error.message} (before byte {self.position})"
+                raise BagError(error.code, self.path, text, error.hint) from error
+            self.damage.lost_chunks += 1
+            self.damage.lose(len(content), error.message)
+            return None
+        self.chunks_read += 1
+        self.stored_bytes += len(chunk.data)
+        self.unpacked_bytes += len(data)
+        self.compressions.add(chunk.compression)
+        return WholeChunk(data, self.position, chunk if self._salvage else None)
+
+    def _cut_chunk(self, content: bytes) -> WholeChunk | None:
+        self.damage.lost_chunks += 1
+        found = self._unpacker.beginning(content)
+        if found is None:
+            return None
+        data, compression, size = found
+        self.compressions.add(compression)
+        return WholeChunk(data, cut=len(data) < size)
 
     def _next_head(self, stream: CheckedStream) -> tuple[int, int]:
         """Read the opcode of a record and the length of its content."""
@@ -208,43 +275,61 @@ class McapFile:
         opcode, length = head
         if length > MAX_RECORD_BYTES:
             raise self._too_large(f"a record of {length} bytes, at most {MAX_RECORD_BYTES} are read")
+        if self._salvage:
+            known = opcode in _KNOWN or opcode >= _FIRST_PRIVATE_OPCODE
+            if not known or stream.position + length > self._size:
+                raise self._ends_early(stream)
         return opcode, length
-
-    def _read(self, stream: CheckedStream, length: int) -> bytes:
-        data = stream.take(length)
-        if len(data) < length:
-            raise self._ends_early(stream)
-        return data
-
-    def _skip(self, stream: CheckedStream, length: int) -> None:
-        if stream.skip(length) < length:
-            raise self._ends_early(stream)
 
     def _ends_early(self, stream: CheckedStream) -> BagError:
         return BagError("AMX6812", self.path, f"ends early, at byte {stream.position}", TRUNCATED_HINT)
 
-    def _parsed(self, parse: Callable[[ReadDataStream], _Record], content: bytes) -> _Record:
-        """Parse one record by the package mcap, which cannot read beyond the record's end."""
+    def _parsed(self, parse: Callable[[ReadDataStream], _Record], content: bytes) -> _Record | None:
+        """Parse one record by the package mcap, which cannot read beyond the record's end; None if it is skipped."""
         try:
             return parse(ReadDataStream(io.BytesIO(content)))
         except (McapError, struct.error, ValueError, OverflowError) as error:
-            raise self._damaged(f"a malformed record: {str(error) or type(error).__name__}") from error
+            if not self._salvage:
+                raise self._damaged(f"a malformed record: {str(error) or type(error).__name__}") from error
+            self.damage.lose(len(content), "a record is malformed")
+            return None
 
     def _check_header(self, opcode: int, content: bytes) -> None:
-        if opcode != Opcode.HEADER:
+        if opcode != Opcode.HEADER and not self._salvage:
             raise self._damaged("the file does not begin with a header")
-        profile = self._parsed(Header.read, content).profile
-        if profile != "ros2":
-            raise BagError(
-                "AMX6811",
-                self.path,
-                f"holds messages of profile {profile[:40]!r}, not 'ros2'",
-                "only recordings of ROS 2 can be read",
-            )
+        header = self._parsed(Header.read, content) if opcode == Opcode.HEADER else None
+        if header is not None and header.profile != "ros2":
+            text = f"holds messages of profile {header.profile[:40]!r}, not 'ros2'"
+            hint = f"only recordings of ROS 2 can be {'repaired' if self._salvage else 'read'}"
+            raise BagError("AMX6811", self.path, text, hint)
+
+    def _check_end(self, stream: CheckedStream, opcode: int, content: bytes, crc: int) -> None:
+        """Check the checksum of the data, or of the section after them and the end of the file."""
+        if opcode == Opcode.DATA_END:
+            end = self._parsed(DataEnd.read, content)
+            self._check_crc(end.data_section_crc if end else 0, crc, "the data")
+            return
+        if not self.damage.finished:
+            raise self._damaged("a footer without the end of the data")
+        footer = self._parsed(Footer.read, content)
+        covered = RECORD_HEAD.pack(opcode, len(content)) + content[: -len(b"crc4")]
+        self._check_crc(footer.summary_crc if footer else 0, zlib.crc32(covered, crc), "the summary")
+        if stream.take(len(MAGIC) + 1) != MAGIC:
+            raise self._damaged("the closing mark is missing or does not end the file")
 
     def _check_crc(self, expected: int, actual: int, what: str) -> None:
         if expected not in (0, actual):
             raise self._damaged(f"the checksum of {what} is wrong")
+
+    def definition(self, opcode: int, content: bytes) -> Schema | Channel | None:
+        """Return a schema or channel; None for a malformed one that is skipped.
+
+        Raises:
+            BagError: it is malformed.
+        """
+        if opcode == Opcode.SCHEMA:
+            return self._parsed(Schema.read, content)
+        return self._parsed(Channel.read, content)
 
     def define(self, opcode: int, content: bytes) -> None:
         """Add a schema or channel; files may repeat them, the first one counts.
@@ -252,21 +337,14 @@ class McapFile:
         Raises:
             BagError: it is damaged, or all of them together are beyond the limits.
         """
-        if opcode == Opcode.SCHEMA:
-            schema = self._parsed(Schema.read, content)
-            if schema.id not in self.schemas:
-                self._admit_definition(content)
-                self.schemas[schema.id] = schema
-        else:
-            channel = self._parsed(Channel.read, content)
-            if channel.id not in self.channels:
-                self._admit_definition(content)
-                self.channels[channel.id] = channel
-
-    def _admit_definition(self, content: bytes) -> None:
-        if self._definition_bytes + len(content) > MAX_RECORD_BYTES:
-            raise self._too_large(f"schemas and channels of more than {MAX_RECORD_BYTES} bytes")
+        record = self.definition(opcode, content)
+        known: dict[int, Any] = self.schemas if opcode == Opcode.SCHEMA else self.channels
+        if record is None or record.id in known or (self._salvage and isinstance(record, Schema) and not record.id):
+            return
         self._definition_bytes += len(content)
+        if self._definition_bytes > MAX_RECORD_BYTES:
+            raise self._too_large(f"schemas and channels of more than {MAX_RECORD_BYTES} bytes")
+        known[record.id] = record
 
     def _message(self, content: bytes) -> RawMessage:
         if len(content) < MESSAGE_FIELDS.size:
@@ -278,22 +356,30 @@ class McapFile:
         schema = self.schemas.get(channel.schema_id)
         return RawMessage(channel, schema, sequence, log_time, publish_time, content[MESSAGE_FIELDS.size :])
 
-    def _unpacked(self, chunk: Chunk, room: Room | None = None) -> Buffer:
-        data: Buffer
-        try:
-            data = self._unpacker.unpacked(chunk) if room is None else self._unpacker.unpacked_in(chunk, room)
-        except BagError as error:
-            raise BagError(
-                error.code, self.path, f"{error.message} (before byte {self.position})", error.hint
-            ) from error
-        self.chunks_read += 1
-        self.stored_bytes += len(chunk.data)
-        self.unpacked_bytes += len(data)
-        return data
-
     def _too_large(self, message: str) -> BagError:
         return BagError("AMX6814", self.path, message)
 
     def _damaged(self, message: str) -> BagError:
         place = self.position if self._place is None else self._place
         return BagError("AMX6813", self.path, f"{message} (before byte {place})", DAMAGED_HINT)
+
+
+def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, begin and end of the content of each schema, channel and message in a chunk's data.
+
+    Raises:
+        ValueError: a record is cut, or is of a kind that a chunk does not hold; private ones are passed over.
+    """
+    position, size = 0, len(data)
+    while position < size:
+        start = position + RECORD_HEAD.size
+        if start > size:
+            raise ValueError("a chunk ends inside a record")
+        opcode, length = RECORD_HEAD.unpack_from(data, position)
+        position = start + length
+        if position > size:
+            raise ValueError(f"a record of {length} bytes in the last {size - start} bytes of a chunk")
+        if opcode in _IN_CHUNK:
+            yield opcode, start, position
+        elif opcode < _FIRST_PRIVATE_OPCODE:
+            raise ValueError(f"a record of kind {opcode} inside a chunk")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import struct
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +22,9 @@ FREE_BYTES = 512 << 20
 """A file may unpack to ``MAX_RATIO`` times its size plus these bytes (decision): recordings come to 10 or 50 times."""
 DAMAGED_HINT = "copy the file again from where it was recorded, or save what is sound by `automax bag repair`"
 
+_CHUNK_FIELDS = struct.Struct("<QQQII")
+"""Beginning of a chunk: first and last time, unpacked size and checksum, length of the compression's name."""
+
 Buffer = bytes | memoryview
 Room = Callable[[int], memoryview]
 """Returns a buffer of a given number of bytes."""
@@ -34,64 +38,58 @@ class Unpacker:
         self._left = FREE_BYTES + MAX_RATIO * stored_bytes
         self._zstd = zstandard.ZstdDecompressor()
 
-    def unpacked(self, chunk: Chunk) -> bytes:
-        """Return the unpacked bytes of a chunk.
+    def unpacked(self, chunk: Chunk, room: Room | None = None) -> Buffer:
+        """Return the unpacked bytes of a chunk, in a buffer from ``room`` if given, called after the size was checked.
 
         Raises:
             BagError: damaged, beyond the limits, or of an unknown compression; the message names no place.
         """
-        self._admit(chunk.uncompressed_size)
-        data = self._decompressed(chunk)
-        self._check(chunk, data)
-        return data
-
-    def unpacked_in(self, chunk: Chunk, room: Room) -> memoryview:
-        """Return the unpacked bytes of a chunk, in a buffer from ``room``, which is called after its size was checked.
-
-        Raises:
-            BagError: as ``unpacked`` does.
-        """
-        self._admit(chunk.uncompressed_size)
-        place = room(chunk.uncompressed_size)
-        if self._is_in(place, chunk):
-            self._check(chunk, place)
-        else:
-            data = self._decompressed(chunk)
-            self._check(chunk, data)
-            place[:] = data
-        return place
-
-    def _decompressed(self, chunk: Chunk) -> bytes:
-        try:
-            return self._whole(chunk.compression, chunk.data, chunk.uncompressed_size)
-        except (zstandard.ZstdError, RuntimeError, EOFError) as error:  # lz4 raises RuntimeError
-            raise self._damaged(f"a chunk cannot be decompressed: {error}") from error
-
-    def _check(self, chunk: Chunk, data: Buffer) -> None:
         size = chunk.uncompressed_size
+        self._admit(size)
+        place = None if room is None else room(size)
+        data: Buffer
+        if place is not None and self._is_in(place, chunk):
+            data = place
+        else:
+            try:
+                data = self._whole(chunk.compression, chunk.data, size)
+            except (zstandard.ZstdError, RuntimeError, EOFError) as error:  # lz4 raises RuntimeError
+                raise self._damaged(f"a chunk cannot be decompressed: {error}") from error
         if len(data) != size:
             raise self._damaged(f"a chunk has {len(data)} bytes and should have {size}")
         if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
             raise self._damaged("the checksum of a chunk is wrong")
+        if place is None or data is place:
+            return data
+        place[:] = data
+        return place
 
-    def beginning(self, compression: str, data: bytes, size: int) -> bytes:
-        """Return as much of a chunk of ``size`` bytes as can be unpacked from the beginning of its compressed data.
+    def beginning(self, content: bytes) -> tuple[bytes, str, int] | None:
+        """Return what can be unpacked of a chunk whose record is cut, its compression and whole size; None if nothing.
 
-        Raises:
-            BagError: beyond the limits.
+        None too if it is beyond the limits, or whole with a wrong checksum.
         """
-        self._admit(size)
-        if not compression:
-            return data[:size]
+        if len(content) < _CHUNK_FIELDS.size:
+            return None
+        *_, size, crc, name_length = _CHUNK_FIELDS.unpack_from(content)
+        start = _CHUNK_FIELDS.size + name_length + 8  # the length of the data
+        if name_length > 4 or start > len(content):
+            return None
+        compression, data = content[_CHUNK_FIELDS.size :][:name_length].decode("latin-1"), content[start:]
         found = bytearray()
-        with contextlib.suppress(zstandard.ZstdError, RuntimeError, EOFError):
-            if compression == "lz4":
+        with contextlib.suppress(BagError, zstandard.ZstdError, RuntimeError, EOFError):
+            self._admit(size)
+            if not compression:
+                found += data[:size]
+            elif compression == "lz4":
                 found += lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size)
             elif compression == "zstd":
                 reader = zstandard.ZstdDecompressor(max_window_size=MAX_RECORD_BYTES).stream_reader(data)
                 while len(found) < size and (part := reader.read(min(1 << 16, size - len(found)))):
                     found += part
-        return bytes(found)
+        if not found or (len(found) == size and crc not in (0, zlib.crc32(found))):
+            return None
+        return bytes(found), compression, size
 
     def _admit(self, size: int) -> None:
         if size > MAX_RECORD_BYTES:

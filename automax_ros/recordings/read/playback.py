@@ -17,6 +17,7 @@ from automax_ros.recordings.mcap.channels import is_known, recorded_qos
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.mcap_file import RawMessage
 from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.read.tally import Tally
 
 TABLE_TYPE = "automax_msgs/msg/VariableTable"
 MAX_LATCHED_BYTES = 256 << 20
@@ -35,7 +36,6 @@ class PlayTopic:
     type_hash: str
     qos: QosProfile
     fault: str = ""
-    message_count: int = 0
 
     @property
     def is_latched(self) -> bool:
@@ -49,15 +49,16 @@ class PlayableRecording:
 
     Times are log times in ns. ``run_start`` is the stamp of the first VariableTable, the time of the first message
     where there is none; ``spaces`` are the namespaces of the racks in it. ``latched`` are the last messages of latched
-    topics before the span.
+    topics before the span. ``counts`` are all messages.
     """
 
     bag: BagReader
+    counts: Tally = field(default_factory=Tally)
     topics: dict[str, PlayTopic] = field(default_factory=dict)
     spaces: list[str] = field(default_factory=list)
     latched: dict[str, RawMessage] = field(default_factory=dict)
     run_start: int | None = None
-    first: int | None = None
+    first: int = 0
     last: int = 0
     begin: int = 0
     end: int = 0
@@ -94,14 +95,13 @@ def survey(
         if not number & _PROGRESS_MASK and stopping():
             return found
         topic = _topic(found, path, record)
-        if found.first is None or record.log_time < found.first:
-            found.first = record.log_time
-        found.last = max(found.last, record.log_time)
+        found.counts.add(topic.name, topic.type_name, record.log_time, record.publish_time)
         if topic.type_name == TABLE_TYPE and not topic.fault:
             _take_table(found, path, record)
     found.bag.on_progress = None
-    if found.first is None:
+    if not found.counts.messages:
         raise BagError("AMX6840", path, "holds no message")
+    found.first, found.last = found.counts.first_log, found.counts.last_log
     start = found.run_start if found.run_start is not None else found.first
     found.run_start = start
     found.begin = start + (begin_ns or 0)
@@ -189,7 +189,6 @@ def _topic(found: PlayableRecording, path: Path, record: RawMessage) -> PlayTopi
                 "AMX6814", path, f"more than {_MAX_TOPICS} topics, or one with a name of {len(name)} characters"
             )
         topic = found.topics[name] = _new_topic(record.channel, record.schema)
-    topic.message_count += 1
     return topic
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,6 +21,7 @@ from automax_ros.messages.types.rack_files import RACK_FILE, RackFile, fingerpri
 from automax_ros.recordings.mcap.channels import is_known
 from automax_ros.recordings.mcap.metadata import FileSummary, TopicSummary
 from automax_ros.recordings.read.reader import custom_data_of, told_information
+from automax_ros.recordings.read.tally import Tally
 
 _MAX_FILES = 200
 _MAX_BYTES = 16 << 20
@@ -85,20 +87,15 @@ class FileSequence:
 
 
 @dataclass
-class FileContents:
-    """Counts of one file; times in nanoseconds, ``stamp`` is a message's own time, ``log`` its log time."""
+class FileContents(Tally):
+    """Contents of one file; ``began`` is the stamp of its first message."""
 
     name: str
-    messages: int = 0
     scans: int = 0
-    first_log: int = 0
-    last_log: int = 0
-    first_stamp: int = 0
-    last_stamp: int = 0
+    began: int = 0
     run_start: int | None = None
     """The stamp in the first VariableTable: the start of the run."""
     rack: str = ""
-    counts: dict[int, int] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
     _decoders: dict[int, Callable[[bytes], object] | None] = field(default_factory=dict)
@@ -127,14 +124,10 @@ class FileContents:
 
     def count(self, channel: int, log_time: int, stamp: int, payload: bytes) -> None:
         """Count a message."""
-        if not self.messages:
-            self.first_log = self.last_log = log_time
-            self.first_stamp = self.last_stamp = stamp
-        self.messages += 1
-        self.first_log, self.last_log = min(self.first_log, log_time), max(self.last_log, log_time)
-        self.last_stamp = max(self.last_stamp, stamp)
-        self.counts[channel] = self.counts.get(channel, 0) + 1
         kind = self.type_of(channel)
+        if not self.messages:
+            self.began = stamp
+        self.add(self.channels[channel].topic, kind, log_time, stamp)
         if kind == SCAN:
             self.scans += 1
         elif kind == TABLE and self.run_start is None:
@@ -150,6 +143,9 @@ class FileContents:
 def topics_of(files: Sequence[FileContents]) -> list[TopicSummary]:
     """Return the topics of a recording's files, each with its number of messages in all files."""
     found: dict[str, TopicSummary] = {}
+    counts: Counter[str] = Counter()
+    for file in files:
+        counts.update({topic: item.messages for topic, item in file.topics.items()})
     for file in files:
         for number, channel in file.channels.items():
             before = found.get(channel.topic)
@@ -159,7 +155,7 @@ def topics_of(files: Sequence[FileContents]) -> list[TopicSummary]:
                 file.type_of(number),
                 metadata.get("topic_type_hash", ""),
                 before.qos if before else _qos(metadata.get("offered_qos_profiles", "")),
-                (before.message_count if before else 0) + file.counts.get(number, 0),
+                counts[channel.topic],
             )
     return list(found.values())
 

@@ -23,8 +23,7 @@ from automax_ros.recordings.mcap.opening import NO_BAG_HINT, no_recording
 from automax_ros.recordings.read.reader import MAX_METADATA_BYTES, BagReader, read_information
 from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.repair.contents import FileContents, FileSequence, Provenance, topics_of
-from automax_ros.recordings.repair.rewriting import Definitions, RepairWriter
-from automax_ros.recordings.repair.salvage import DamagedFileReader
+from automax_ros.recordings.repair.rewriting import RepairWriter
 
 MAX_FILES = 10_000
 _NUMBERED = re.compile(r"(.*?)_?(\d{1,9})\.mcap")
@@ -84,7 +83,7 @@ class RepairReport:
         """The stamp of the start of the run, or of the first message without a VariableTable."""
         filled = [file.contents for file in self.files if file.contents.messages]
         told = [item.run_start for item in filled if item.run_start is not None]
-        return told[0] if told else min((item.first_stamp for item in filled), default=0)
+        return told[0] if told else min((item.began for item in filled), default=0)
 
 
 def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float], None] | None = None) -> RepairReport:
@@ -348,15 +347,15 @@ def _nothing(report: RepairReport) -> BagError:
 
 
 def _rewrite(path: Path, target: Path, file: FileReport, provenance: Provenance) -> None:
-    salvage = DamagedFileReader(path)
-    rewriting = RepairWriter(target, salvage, Definitions(path), provenance, copy.deepcopy(file.before))
+    rewriting = RepairWriter(target, path, provenance, copy.deepcopy(file.before))
     try:
         rewriting.write()
     finally:
         rewriting.close()
     file.contents = rewriting.contents
-    file.damage += [text for text in salvage.damage if text not in file.damage]
-    file.lost_bytes, file.lost_chunks = salvage.lost_bytes, salvage.lost_chunks
+    damage = rewriting.damage
+    file.damage += [text for text in damage.texts if text not in file.damage]
+    file.lost_bytes, file.lost_chunks = damage.lost_bytes, damage.lost_chunks
     file.dropped_messages, file.dropped_scans = rewriting.dropped_messages, rewriting.dropped_scans
 
 

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import contextlib
+from collections.abc import Callable, Iterable, Sequence, Set
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Attachment, Metadata
 
 import automax_ros
 from automax_ros.core.kinds import WriteKind
 from automax_ros.messages.cdr.cdr import CdrError, decode
 from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD, ChunkBuilder
-from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.chunk_table import WholeChunk
+from automax_ros.recordings.mcap.mcap_file import McapFile, chunk_records
 from automax_ros.recordings.mcap.mcap_output import McapOutput
 from automax_ros.recordings.mcap.metadata import BagMetadata, yaml_text
-from automax_ros.recordings.mcap.unpacking import MAX_RECORD_BYTES
 from automax_ros.recordings.repair.contents import SCAN, WRITE, FileContents, FileSequence, Provenance
-from automax_ros.recordings.repair.salvage import DamagedFileReader, SoundChunk, SoundPiece, parsed, records
 from automax_ros.recordings.write.data_file import DataFile
 
 _LOOSE_BYTES = 1 << 20
@@ -36,72 +36,51 @@ class Found(NamedTuple):
     payload: bytes
 
 
-class Definitions:
-    """The schemas and channels from anywhere in a file; of those with the same number, the first."""
+def with_definitions(path: Path) -> McapFile:
+    """Read a damaged file, and return it with the schemas and channels from anywhere in it.
 
-    def __init__(self, path: Path) -> None:
-        """Read the whole file.
-
-        Raises:
-            BagError: it cannot be read or is beyond the limits.
-        """
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
-        self.compression = ""
-        self._bytes = 0
-        self._path = path
-        compressions = set()
-        for piece in DamagedFileReader(path).pieces():
-            if isinstance(piece, (Schema, Channel)):
-                self._take(piece)
-            elif isinstance(piece, SoundChunk):
-                compressions.add(piece.packed.compression if piece.packed else piece.compression)
-                for record in definitions_in(piece.data):
-                    self._take(record)
-        self.compression = compressions.pop() if len(compressions) == 1 else "zstd"
-
-    def usable(self, channel: int) -> bool:
-        """Whether a channel is defined, and its schema if it has one."""
-        known = self.channels.get(channel)
-        return known is not None and (known.schema_id == 0 or known.schema_id in self.schemas)
-
-    def _take(self, record: Schema | Channel) -> None:
-        if isinstance(record, Schema):
-            if record.id and record.id not in self.schemas:
-                self.schemas[record.id] = record
-                self._bytes += len(record.data) + len(record.name)
-        elif record.id not in self.channels:
-            self.channels[record.id] = record
-            self._bytes += len(record.topic) + sum(map(len, record.metadata.values()))
-        if self._bytes > MAX_RECORD_BYTES:
-            raise BagError("AMX6814", self._path, f"schemas and channels of more than {MAX_RECORD_BYTES} bytes")
+    Raises:
+        BagError: it cannot be read or is beyond the limits.
+    """
+    file = McapFile(path, salvage=True)
+    for piece in file.pieces():
+        if isinstance(piece, WholeChunk):
+            data = bytes(piece.data)
+            with contextlib.suppress(ValueError):
+                for opcode, start, end in chunk_records(data):
+                    if opcode != Opcode.MESSAGE:
+                        file.define(opcode, data[start:end])
+    return file
 
 
 class RepairWriter:
     """Rewrites one file: call ``write``, and ``close`` in any case; then the counts describe the result."""
 
     def __init__(
-        self,
-        target: Path,
-        salvage: DamagedFileReader,
-        definitions: Definitions,
-        provenance: Provenance,
-        sequence: FileSequence | None = None,
+        self, target: Path, source: Path, provenance: Provenance, sequence: FileSequence | None = None
     ) -> None:
-        """Create the file. ``sequence`` checks the order of its messages, None if they may have any order."""
+        """Create the file. ``sequence`` checks the order of its messages, None if they may have any order.
+
+        Raises:
+            BagError: the damaged file ``source`` cannot be read or is beyond the limits.
+        """
         self.contents = FileContents(target.name)
         self._sequence = sequence
+        self._definitions = definitions = with_definitions(source)
         self.contents.schemas, self.contents.channels = definitions.schemas, definitions.channels
         self.dropped_messages = 0
         self.dropped_scans = 0
-        self._definitions = definitions
         self._defined: set[tuple[type, int]] = set()
-        self._salvage = salvage
+        self._source = McapFile(source, salvage=True)
+        self.damage = self._source.damage
         self._provenance = provenance
         self._loose = ChunkBuilder()
         self._file = DataFile(target)
+        compressions = definitions.compressions
         self._output = McapOutput(
-            self._file, library=f"automax_ros {automax_ros.__version__}", compression=definitions.compression
+            self._file,
+            library=f"automax_ros {automax_ros.__version__}",
+            compression=next(iter(compressions)) if len(compressions) == 1 else "zstd",
         )
         self._output.schemas, self._output.channels = definitions.schemas, definitions.channels
 
@@ -112,16 +91,16 @@ class RepairWriter:
             BagError: the damaged file cannot be read or is beyond the limits.
             OSError: the disk cannot be written.
         """
-        waiting: SoundChunk | None = None
-        for piece in self._salvage.pieces():
-            if isinstance(piece, SoundChunk):
+        waiting: WholeChunk | None = None
+        for piece in self._source.pieces():
+            if isinstance(piece, WholeChunk):
                 if waiting is not None:
                     self._put_chunk(waiting, last=False)
                 waiting = piece
             else:
                 self._put(piece)
         if waiting is not None:
-            self._put_chunk(waiting, last=not self._salvage.finished)
+            self._put_chunk(waiting, last=not self.damage.finished)
         self._end_loose()
         own = BagMetadata([self.contents.summary()]).information()
         self._output.add_metadata(Metadata(name="rosbag2", metadata={"serialized_metadata": yaml_text(own)}))
@@ -131,7 +110,7 @@ class RepairWriter:
         """Close the file."""
         self._file.close()
 
-    def _put(self, piece: SoundPiece) -> None:
+    def _put(self, piece: Attachment | Metadata | bytes) -> None:
         if isinstance(piece, Attachment):
             self._provenance.take(piece)
             self._output.add_attachment(piece)
@@ -139,38 +118,41 @@ class RepairWriter:
             self._provenance.take(piece)
             if piece.name != "rosbag2":
                 self._output.add_metadata(piece)
-        elif isinstance(piece, bytes):
-            self._add(self._chosen([_found(piece)]), self._loose)
+        else:
+            self._add(self._chosen([_found(piece)]))
             if self._loose.size > _LOOSE_BYTES:
                 self._end_loose()
 
-    def _put_chunk(self, piece: SoundChunk, *, last: bool) -> None:
+    def _put_chunk(self, piece: WholeChunk, *, last: bool) -> None:
         """Write a chunk: unchanged if all of it is sound, else only its sound messages."""
+        data = bytes(piece.data)
         found: list[Found] = []
         index: dict[int, list[int]] = {}
-        end = others = 0
-        for opcode, start, end in records(piece.data):
-            others += 1
-            if opcode == Opcode.MESSAGE and end - start >= MESSAGE_FIELDS.size:
-                message = _found(piece.data[start:end])
-                others -= 1
-                found.append(message)
-                index.setdefault(message.channel, []).extend((message.log_time, start - RECORD_HEAD.size))
+        inner: set[tuple[type, int]] = set()
+        end, whole = 0, piece.packed is not None
+        with contextlib.suppress(ValueError):
+            for opcode, start, end in chunk_records(data):
+                content = data[start:end]
+                if opcode != Opcode.MESSAGE:
+                    record = self._definitions.definition(opcode, content)
+                    whole = whole and record is not None
+                    inner |= {(type(record), record.id)} if record is not None else set()
+                elif len(content) >= MESSAGE_FIELDS.size:
+                    message = _found(content)
+                    found.append(message)
+                    index.setdefault(message.channel, []).extend((message.log_time, start - RECORD_HEAD.size))
+                else:
+                    whole = False
         keep = kept(found, self.contents.type_of, cut=piece.cut) if last or piece.cut else len(found)
         self._drop(found[keep:])
         chosen = self._chosen(found[:keep])
-        definitions = definitions_in(piece.data)  # a record that cannot be parsed is not among them
-        whole = len(chosen) == len(found) and end == len(piece.data) and others == len(definitions)
-        if piece.packed is None or not whole:
+        if piece.packed is None or not whole or len(chosen) < len(found) or end < len(data):
             self._end_loose()
-            self._add(chosen, self._loose)
+            self._add(chosen)
             self._end_loose()
-            return
-        builder = ChunkBuilder(index)
-        if found:
-            inner = frozenset((type(record), record.id) for record in definitions)
+        elif found:
             self._define(index, inner)
-            self._output.add_packed_chunk(piece.packed, builder)
+            self._output.add_packed_chunk(piece.packed, ChunkBuilder(index))
             self._count(found)
 
     def _chosen(self, messages: Sequence[Found]) -> list[Found]:
@@ -179,24 +161,28 @@ class RepairWriter:
         self._drop([message for message, usable in zip(messages, places, strict=True) if not usable])
         return [message for message, usable in zip(messages, places, strict=True) if usable]
 
-    def _add(self, messages: Sequence[Found], chunk: ChunkBuilder) -> None:
+    def _add(self, messages: Sequence[Found]) -> None:
         self._define({message.channel for message in messages})
         for message in messages:
-            chunk.add_message(message.channel, message.sequence, message.log_time, message.stamp, message.payload)
+            self._loose.add_message(message.channel, message.sequence, message.log_time, message.stamp, message.payload)
         self._count(messages)
 
     def _is_usable(self, message: Found) -> bool:
+        """Whether the channel of a message is defined, and its schema if it has one, and the message is in order."""
         contents, channel, payload = self.contents, message.channel, message.payload
-        if not self._definitions.usable(channel) or contents.fault(channel, payload):
+        known = contents.channels.get(channel)
+        if known is None or (known.schema_id and known.schema_id not in contents.schemas):
+            return False
+        if contents.fault(channel, payload):
             return False
         sequence = self._sequence
         return sequence is None or not sequence.fault(message.log_time, contents.type_of(channel), payload)
 
-    def _define(self, channels: Iterable[int], inner: frozenset[tuple[type, int]] = frozenset()) -> None:
+    def _define(self, channels: Iterable[int], inner: Set[tuple[type, int]] = frozenset()) -> None:
         """Write the definitions of channels that were not written yet; ``inner`` are in the chunk itself."""
         for number in sorted(channels):
-            channel = self._definitions.channels[number]
-            schema = self._definitions.schemas.get(channel.schema_id)
+            channel = self.contents.channels[number]
+            schema = self.contents.schemas.get(channel.schema_id)
             for record in (schema, channel):
                 if record is not None and (type(record), record.id) not in self._defined | inner:
                     self._output.add_definition(record)
@@ -253,17 +239,3 @@ def _lacks_writes(messages: Sequence[Found], type_of: Callable[[int], str]) -> b
 def _found(content: bytes) -> Found:
     channel, sequence, log_time, stamp = MESSAGE_FIELDS.unpack_from(content)
     return Found(channel, sequence, log_time, stamp, content[MESSAGE_FIELDS.size :])
-
-
-def definitions_in(data: bytes) -> list[Schema | Channel]:
-    """Return the schemas and channels in a chunk's data that can be parsed."""
-    found: list[Schema | Channel] = []
-    for opcode, start, end in records(data):
-        record = None
-        if opcode == Opcode.SCHEMA:
-            record = parsed(Schema.read, data[start:end])
-        elif opcode == Opcode.CHANNEL:
-            record = parsed(Channel.read, data[start:end])
-        if record is not None:
-            found.append(record)
-    return found

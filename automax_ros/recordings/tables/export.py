@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from automax_ros.core.safe_file import atomic_write, open_at_once
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.values import real_text
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.whole_file import atomic_write, open_at_once
 from automax_ros.recordings.read.common_log import Cell
 from automax_ros.recordings.tables.series import WHOLE_RUN, Progress, Series, Window
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from automax_ros.core.safe_file import atomic_write, open_at_once
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.whole_file import atomic_write, open_at_once
 from automax_ros.recordings.read.common_log import Cell
 from automax_ros.recordings.tables.export import TIME, Column, Table, unwritable
 

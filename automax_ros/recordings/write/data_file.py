@@ -86,12 +86,3 @@ class DataFile:
         """Close the file."""
         with self._lock:
             self._file.close()
-
-
-def sync_path(path: Path) -> None:
-    """Wait until a file or folder is on the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

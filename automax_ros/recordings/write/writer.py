@@ -19,6 +19,7 @@ from mcap.records import Attachment, Metadata, Schema
 from mcap.records import Channel as ChannelRecord
 
 import automax_ros
+from automax_ros.core.safe_file import sync_path
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.types.definitions import message_types, schema_text
 from automax_ros.messages.types.topics import QosProfile
@@ -35,7 +36,7 @@ from automax_ros.recordings.mcap.metadata import (
     yaml_text,
 )
 from automax_ros.recordings.write.chunk_thread import ChunkThread
-from automax_ros.recordings.write.data_file import COMPRESSIONS, DataFile, StorageOptions, sync_path
+from automax_ros.recordings.write.data_file import COMPRESSIONS, DataFile, StorageOptions
 
 AT_ONCE_BYTES: Final = 1 << 16
 """A chunk of up to this many bytes, uncompressed, is written in the calling thread where no clock is followed

@@ -29,7 +29,7 @@ def late(tmp_path: Path) -> Path:
 def test_survey_tells_topics_span_and_racks(tmp_path):
     found = survey(sample_recording(tmp_path / "bag"))
     assert found.spaces == ["/line1"]
-    assert {name: topic.message_count for name, topic in found.topics.items()} == {
+    assert {name: topic.messages for name, topic in found.counts.topics.items()} == {
         "/line1/variables": 1,
         "/line1/backplane/snapshot": 1,
         "/line1/backplane": 454,

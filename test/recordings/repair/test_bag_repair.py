@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import random
 import shutil
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from mcap.data_stream import ReadDataStream
 from mcap.reader import make_reader
+from mcap.records import Chunk
 from replay.reexecution import Reexecution
 
 from automax_ros.core.ticks import NS_PER_S
@@ -25,6 +28,7 @@ from automax_ros.recordings.repair.rewriting import Found, kept
 from automax_ros.recordings.write.data_file import COMPRESSIONS, StorageOptions
 from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.recordings.write.writer import BagWriter
+from recordings.mutations import HEAD, chunk_record, record_places
 from recordings.others import assert_mcap_reads, rosbags_messages
 from recordings.recordings import TABLE, image_of, record, write_of
 from recordings.write.test_bag_split import files, recorded
@@ -297,6 +301,23 @@ def test_foreign_recordings_are_repaired_too(tmp_path: Path) -> None:
     assert [item.message.data for item in messages(report.output)] == [f"number {index}" for index in range(57)]
     assert [path.name for path in files(report.output)] == ["other_0.mcap"]
     assert_others_read(report.output)
+
+
+def test_a_private_record_inside_a_chunk_costs_nothing(tmp_path: Path) -> None:
+    """Readers pass over records that they do not know, and so does the repair."""
+    bag = recorded(tmp_path, RecordingOptions(StorageOptions(compression="none", chunk_ns=NS_PER_S)), 3.0)
+    data = (bag / "scans_0.mcap").read_bytes()
+    begin, end, _ = chunk_places(bag / "scans_0.mcap")[1]
+    chunk = Chunk.read(ReadDataStream(BytesIO(data[begin + HEAD.size : end])))
+    _, place, _ = record_places(chunk.data, 0)[5]
+    inner = chunk.data[:place] + HEAD.pack(0x80, 3) + b"own" + chunk.data[place:]
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "scans_0.mcap").write_bytes(
+        data[:begin] + chunk_record("", inner, len(inner)) + data[end:-20]
+    )
+    report = repair(tmp_path / "broken")
+    assert report.output is not None
+    assert messages(report.output) == messages(bag)
 
 
 def scan(stamp: int, committed: int) -> Found:

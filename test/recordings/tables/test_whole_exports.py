@@ -1,4 +1,4 @@
-"""Outputs are there whole or not at all; special files are written themselves."""
+"""Tables are there whole or not at all; special files are written themselves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.whole_file import atomic_write
 from automax_ros.recordings.read.common_log import Cell
 from automax_ros.recordings.tables.export import CommonTable, Table, write_csv
 from automax_ros.recordings.tables.export_npz import write_npz
@@ -50,43 +49,6 @@ def test_a_broken_export_changes_nothing(tmp_path: Path, bag: Path, name: str, b
     with pytest.raises(BagError, match="AMX6813"):
         write_npz(bag, table, output) if name.endswith("npz") else write_csv(table, output)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == ({} if before is None else {name: before})
-
-
-def test_the_file_appears_at_the_end_with_its_suffix(tmp_path: Path) -> None:
-    output = tmp_path / "OUT.svg"
-    with atomic_write(output) as place:
-        assert (place.parent, place.suffix, place != output) == (tmp_path, ".svg", True)
-        place.write_text("whole")
-        assert not output.exists()
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("OUT.svg", "whole")]
-
-
-def test_links_and_permissions_stay(tmp_path: Path) -> None:
-    target = tmp_path / "there" / "real.csv"
-    target.parent.mkdir()
-    target.write_text("old")
-    target.chmod(0o640)
-    link = tmp_path / "link.csv"
-    link.symlink_to(target)
-    with atomic_write(link) as place:
-        place.write_text("new")
-    assert link.is_symlink()
-    assert (target.read_text(), target.stat().st_mode & 0o777) == ("new", 0o640)
-    with atomic_write(tmp_path / "fresh.csv") as place:
-        place.write_text("new")
-    with (tmp_path / "usual").open("w"):
-        pass
-    assert (tmp_path / "fresh.csv").stat().st_mode == (tmp_path / "usual").stat().st_mode
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everything")
-def test_a_file_that_must_not_be_written_is_not_replaced(tmp_path: Path) -> None:
-    output = tmp_path / "OUT.csv"
-    output.write_text("old")
-    output.chmod(0o444)
-    with pytest.raises(PermissionError), atomic_write(output):
-        pass
-    assert output.read_text() == "old"
 
 
 def test_a_pipe_is_written_itself(tmp_path: Path, bag: Path) -> None:
