@@ -31,7 +31,7 @@ from automax_ros.messages.types.topics import LATCHED, SCAN
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rackfile.loader import load
 from automax_ros.recordings.read.reader import BagReader
-from automax_ros.recordings.tables.export import export_csv
+from automax_ros.recordings.tables.export import CommonTable, write_csv
 from automax_ros.recordings.write.data_file import COMPRESSIONS, StorageOptions
 from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 from automax_ros.recordings.write.writer import BagWriter
@@ -98,7 +98,9 @@ def print_recording(folder: Path) -> None:
     on_disk = sum(path.stat().st_size for path in bag.iterdir())
     print(f"{'on disk':28}{on_disk / MESSAGES:12.1f} bytes per message of {size / MESSAGES:.0f}")
     print_rate("read", timeit.timeit(lambda: sum(1 for _ in BagReader(bag).messages()), number=1), size)
-    print_rate("export 10 variables to CSV", timeit.timeit(lambda: export_csv(bag, table_file), number=1), size)
+    print_rate(
+        "export 10 variables to CSV", timeit.timeit(lambda: write_csv(CommonTable(bag), table_file), number=1), size
+    )
 
 
 def run_seconds(folder: Path | None, compression: str = "zstd") -> float:

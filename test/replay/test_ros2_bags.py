@@ -15,7 +15,7 @@ from automax_ros.recordings.info.info import bag_info, task_facts
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.playback import survey
 from automax_ros.recordings.read.reader import BagReader
-from automax_ros.recordings.tables.export import CommonTable, export_csv
+from automax_ros.recordings.tables.export import CommonTable, write_csv
 from automax_ros.recordings.tables.scan_table import ScanTable
 from automax_ros.recordings.tables.series import Window
 from automax_ros.recordings.tables.traces import traces
@@ -35,7 +35,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 def test_the_export_is_that_of_our_own_recording(bags: tuple[Path, Path], tmp_path: Path) -> None:
     for number, bag in enumerate(bags):
-        export_csv(bag, tmp_path / f"{number}.csv", window=Window(SETTLED))
+        write_csv(CommonTable(bag, window=Window(SETTLED)), tmp_path / f"{number}.csv")
     ours, theirs = ((tmp_path / f"{number}.csv").read_text().splitlines() for number in (0, 1))
     assert len(ours) > 100
     assert theirs == ours

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import re
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from mcap.records import Attachment
 
@@ -18,8 +18,8 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.text import count_of
 from automax_ros.messages.cdr.cdr import CdrError, decoder
 from automax_ros.messages.cdr.message_headers import scan_head
-from automax_ros.messages.types.messages import Operation, Scan, ScanError, String, VariableTable
-from automax_ros.messages.types.rack_files import RackFilesError, files_from_text, source_name
+from automax_ros.messages.types.messages import Operation, ScanError, VariableTable
+from automax_ros.messages.types.rack_files import RACK_FILE, RackFilesError, files_from_text, source_name
 from automax_ros.rackfile.checks.tasks import check_source, commons_of
 from automax_ros.rackfile.loader import load_stored
 from automax_ros.recordings.mcap.errors import BagError
@@ -27,7 +27,7 @@ from automax_ros.recordings.mcap.mcap_file import TRUNCATED_HINT, McapFile, RawM
 from automax_ros.recordings.mcap.opening import NO_BAG_HINT, size_of
 from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT
 from automax_ros.recordings.read.common_log import variables_of
-from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.read.reader import BagReader, file_place
 from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.read.tally import Tally
 from automax_ros.recordings.tables.series import Progress
@@ -43,7 +43,6 @@ _FILES_TOPIC = "/config"
 _NO_ERRORS = bytes(4)
 """End of a Scan without errors: the length of an empty list."""
 _PROGRESS_MASK = 0x3FF
-_NUMBER = re.compile(r"(\d{1,9})(?=\.mcap$)")
 REPAIR_HINT = "`automax bag repair` makes a whole recording of what is readable"
 
 
@@ -82,9 +81,9 @@ class FileInfo:
 
     name: str
     size: int
-    chunks: int = 0
-    stored_bytes: int = 0
-    unpacked_bytes: int = 0
+    chunks: int
+    stored_bytes: int
+    unpacked_bytes: int
 
 
 @dataclass(frozen=True)
@@ -163,8 +162,6 @@ def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None
     before = 0
     for file in files:
         data = McapFile(file)
-        entry = FileInfo(file.name, size_of(file))
-        info.files.append(entry)
         try:
             for number, record in enumerate(data.records()):
                 _count(info, record)
@@ -174,12 +171,9 @@ def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None
             if not info.messages and error.code in {"AMX6810", "AMX6811"}:
                 raise
             info.problems.append(_with_repair(error))
-        entry.chunks, entry.stored_bytes, entry.unpacked_bytes = (
-            data.chunks_read,
-            data.stored_bytes,
-            data.unpacked_bytes,
-        )
-        before += entry.size
+        counts = data.chunks_read, data.stored_bytes, data.unpacked_bytes
+        info.files.append(FileInfo(file.name, size_of(file), *counts))
+        before += info.files[-1].size
     if info.table is not None:
         # A rack sends its files before its run begins, but the recording of a run begins with the run.
         info.first_stamp = min(max(info.first_stamp, info.table.stamp), info.last_stamp)
@@ -194,18 +188,13 @@ def _data_files(info: BagInfo) -> list[Path]:
         reader = BagReader(info.path)
     except BagError as error:
         found = info.path.glob("*.mcap") if info.path.is_dir() else ()
-        files = sorted(filter(Path.is_file, found), key=_in_order)
+        files = sorted(filter(Path.is_file, found), key=file_place)
         if not files or error.code == "AMX6811":
             raise
         info.problems.append(_with_repair(error))
         return files
     info.custom_data = reader.custom_data
     return reader.files
-
-
-def _in_order(path: Path) -> tuple[int, str]:
-    match = _NUMBER.search(path.name)
-    return int(match[1]) if match else 0, path.name
 
 
 def _with_repair(error: BagError) -> BagError:
@@ -222,9 +211,7 @@ def _count(info: BagInfo, record: object) -> None:
         if name == _SCAN:
             _count_scan(info, record)
         elif name == _OPERATION and len(info.operations) < MOST_KEPT:
-            operation = _decoded(info, _OPERATION, record)
-            assert isinstance(operation, Operation)
-            info.operations.append(operation)
+            info.operations.append(_decoded(info, _OPERATION, record))
         elif name == _TABLE and info.table is None:
             _keep_table(info, record)
         elif name == _STRING and record.channel.topic.endswith(_FILES_TOPIC) and not info.texts:
@@ -245,16 +232,13 @@ def _count_scan(info: BagInfo, record: RawMessage) -> None:
         task = info.tasks[head.task] = TaskInfo()
     task.count(head.scan)
     if record.data[-len(_NO_ERRORS) :] != _NO_ERRORS:
-        scan = _decoded(info, _SCAN, record)
-        assert isinstance(scan, Scan)
-        for logged in scan.errors:
+        for logged in _decoded(info, _SCAN, record).errors:
             if logged in task.errors or len(task.errors) < MOST_KEPT:
                 task.errors[logged] += 1
 
 
 def _keep_table(info: BagInfo, record: RawMessage) -> None:
     table = _decoded(info, _TABLE, record)
-    assert isinstance(table, VariableTable)
     variables_of(info.path, table)
     info.table = table
 
@@ -262,12 +246,11 @@ def _keep_table(info: BagInfo, record: RawMessage) -> None:
 def _keep_sent_files(info: BagInfo, record: RawMessage) -> None:
     """Keep the files that a rack has sent, for a recording without stored files."""
     with contextlib.suppress(CdrError, RackFilesError):  # another program's topic of that name
-        message = decoder(_STRING)(record.data)
-        assert isinstance(message, String)
+        message: Any = decoder(_STRING)(record.data)
         info.texts.update((file.name, file.text) for file in files_from_text(message.data))
 
 
-def _decoded(info: BagInfo, type_name: str, record: RawMessage) -> object:
+def _decoded(info: BagInfo, type_name: str, record: RawMessage) -> Any:
     try:
         return decoder(type_name)(record.data)
     except CdrError as error:
@@ -298,9 +281,6 @@ def _check(info: BagInfo, progress: Progress | None) -> None:
     info.gaps = list(verdict.gaps)
     if verdict.fault is not None:
         info.problems.append(verdict.fault)
-
-
-RACK_FILE = "rack.yaml"
 
 
 @dataclass(frozen=True)

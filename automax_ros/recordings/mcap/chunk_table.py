@@ -63,7 +63,12 @@ MESSAGE_HEAD = RECORD_HEAD.size + MESSAGE_FIELDS.size
 """Bytes of a record before the message itself."""
 Definition = tuple[int, int, bytes]
 """A schema or channel: the place of its record, its opcode and its content."""
-_DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
+DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
+MESSAGE = int(Opcode.MESSAGE)
+"""A plain number: comparing with a member of an enumeration takes longer than finding a record."""
+FIRST_PRIVATE_OPCODE = 0x80
+"""First private opcode; readers skip records that they do not know."""
+_IN_CHUNK = DEFINITIONS | {MESSAGE}
 _MOST_DEFINITIONS = 10_000
 MOST_MESSAGES = 400_000
 """The messages of a chunk with more than this are read one by one (decision: a bound on memory for untrusted
@@ -127,7 +132,7 @@ class WholeChunk:
         found = np.ndarray((len(self.data) - MESSAGE_HEAD + 1,), f"V{MESSAGE_HEAD}", self.data, strides=(1,))
         heads = found[places].view(_HEAD)
         lengths = heads["length"]
-        if (heads["opcode"] != int(Opcode.MESSAGE)).any() or (lengths < MESSAGE_FIELDS.size).any():
+        if (heads["opcode"] != MESSAGE).any() or (lengths < MESSAGE_FIELDS.size).any():
             return None
         if (lengths > len(self.data)).any():
             return None
@@ -137,8 +142,14 @@ class WholeChunk:
         if (known > begins).any():
             return None
         gaps = np.flatnonzero(known < begins)
-        definitions = list(self._definitions(zip(known[gaps].tolist(), begins[gaps].tolist(), strict=True)))
-        if None in definitions or len(definitions) > _MOST_DEFINITIONS:
+        definitions: list[Definition] = []
+        try:
+            for begin, end in zip(known[gaps].tolist(), begins[gaps].tolist(), strict=True):
+                between = chunk_records(self.data[begin:end])
+                definitions += (definition_at(self.data, begin + start - RECORD_HEAD.size) for _, start, _ in between)
+        except ValueError:
+            return None
+        if len(definitions) > _MOST_DEFINITIONS or any(opcode == MESSAGE for _, opcode, _ in definitions):
             return None
         return ChunkTable(
             heads["channel"].astype(np.int64),
@@ -146,21 +157,29 @@ class WholeChunk:
             lengths.astype(np.int64) - MESSAGE_FIELDS.size,
             heads["log_time"].copy(),
             heads["publish_time"].copy(),
-            tuple(item for item in definitions if item is not None),
+            tuple(definitions),
         )
 
-    def _definitions(self, gaps: Iterator[tuple[int, int]]) -> Iterator[Definition | None]:
-        """Yield the records between messages; None for one that is neither schema nor channel."""
-        for begin, end in gaps:
-            position = begin
-            while position < end:
-                start = position + RECORD_HEAD.size
-                opcode, length = RECORD_HEAD.unpack_from(self.data, position) if start <= end else (0, 0)
-                if opcode not in _DEFINITIONS or start + length > end:
-                    yield None
-                    return
-                yield definition_at(self.data, position)
-                position = start + length
+
+def chunk_records(data: Buffer) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, begin and end of the content of each schema, channel and message in a chunk's data.
+
+    Raises:
+        ValueError: a record is cut, or is of a kind that a chunk does not hold; private ones are passed over.
+    """
+    position, size = 0, len(data)
+    while position < size:
+        start = position + RECORD_HEAD.size
+        if start > size:
+            raise ValueError("a chunk ends inside a record")
+        opcode, length = RECORD_HEAD.unpack_from(data, position)
+        position = start + length
+        if position > size:
+            raise ValueError(f"a record of {length} bytes in the last {size - start} bytes of a chunk")
+        if opcode in _IN_CHUNK:
+            yield opcode, start, position
+        elif opcode < FIRST_PRIVATE_OPCODE:
+            raise ValueError(f"a record of kind {opcode} inside a chunk")
 
 
 def definition_at(data: Buffer, place: int) -> Definition:

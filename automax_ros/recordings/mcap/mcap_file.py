@@ -26,29 +26,29 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Me
 
 from automax_ros.recordings.mcap.checked_stream import CheckedStream
 from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
-from automax_ros.recordings.mcap.chunk_table import WholeChunk
+from automax_ros.recordings.mcap.chunk_table import (
+    DEFINITIONS,
+    FIRST_PRIVATE_OPCODE,
+    MESSAGE,
+    WholeChunk,
+    chunk_records,
+)
 from automax_ros.recordings.mcap.damage import Damage
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.mcap_output import MAGIC
 from automax_ros.recordings.mcap.opening import NO_BAG_HINT, opened
 from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Room, Unpacker
 
-_FIRST_PRIVATE_OPCODE = 0x80
-"""First private opcode; readers skip records that they do not know."""
 TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag repair` saves what is sound"
 
 _KNOWN = frozenset(map(int, Opcode))
-_DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
-_MESSAGE = int(Opcode.MESSAGE)
-"""A plain number: comparing with a member of an enumeration takes longer than finding a record."""
-_IN_CHUNK = _DEFINITIONS | {_MESSAGE}
 _ENDS = frozenset({int(Opcode.DATA_END), int(Opcode.FOOTER)})
 _NOTHING: frozenset[int] = frozenset()
 _INDEXES = frozenset({int(Opcode.MESSAGE_INDEX)})
-_MESSAGES = _INDEXES | {int(Opcode.CHUNK), _MESSAGE}
+_MESSAGES = _INDEXES | {int(Opcode.CHUNK), MESSAGE}
 _SUMMARY = frozenset(range(256)) - {int(Opcode.FOOTER)}
 """Records that may be skipped: between the end of the data and the footer all of them."""
-_SALVAGED_SUMMARY = _KNOWN - _DEFINITIONS - _ENDS
+_SALVAGED_SUMMARY = _KNOWN - DEFINITIONS - _ENDS
 """Those skipped there if the file is damaged: definitions may be lost elsewhere."""
 _END, _CUT = -1, -2
 """In place of an opcode: the end of the data, a chunk of which the file has only a part."""
@@ -162,7 +162,7 @@ class McapFile:
         self._place = chunk.place
         try:
             for opcode, start, end in chunk_records(data):
-                if opcode == _MESSAGE:
+                if opcode == MESSAGE:
                     yield self._message(data[start:end])
                 else:
                     self.define(opcode, data[start:end])
@@ -210,7 +210,7 @@ class McapFile:
                 if skipped is None:
                     self._check_header(opcode, content)
                     skipped = without
-                if opcode in _DEFINITIONS:
+                if opcode in DEFINITIONS:
                     self.define(opcode, content)
                 elif opcode not in _ENDS:
                     yield opcode, content
@@ -276,7 +276,7 @@ class McapFile:
         if length > MAX_RECORD_BYTES:
             raise self._too_large(f"a record of {length} bytes, at most {MAX_RECORD_BYTES} are read")
         if self._salvage:
-            known = opcode in _KNOWN or opcode >= _FIRST_PRIVATE_OPCODE
+            known = opcode in _KNOWN or opcode >= FIRST_PRIVATE_OPCODE
             if not known or stream.position + length > self._size:
                 raise self._ends_early(stream)
         return opcode, length
@@ -362,24 +362,3 @@ class McapFile:
     def _damaged(self, message: str) -> BagError:
         place = self.position if self._place is None else self._place
         return BagError("AMX6813", self.path, f"{message} (before byte {place})", DAMAGED_HINT)
-
-
-def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield opcode, begin and end of the content of each schema, channel and message in a chunk's data.
-
-    Raises:
-        ValueError: a record is cut, or is of a kind that a chunk does not hold; private ones are passed over.
-    """
-    position, size = 0, len(data)
-    while position < size:
-        start = position + RECORD_HEAD.size
-        if start > size:
-            raise ValueError("a chunk ends inside a record")
-        opcode, length = RECORD_HEAD.unpack_from(data, position)
-        position = start + length
-        if position > size:
-            raise ValueError(f"a record of {length} bytes in the last {size - start} bytes of a chunk")
-        if opcode in _IN_CHUNK:
-            yield opcode, start, position
-        elif opcode < _FIRST_PRIVATE_OPCODE:
-            raise ValueError(f"a record of kind {opcode} inside a chunk")

@@ -61,7 +61,7 @@ class McapOutput:
     chunk or by ``add_definition``.
     """
 
-    def __init__(self, output: Output, *, library: str, compression: str, profile: str = "ros2") -> None:
+    def __init__(self, output: Output, *, library: str, compression: str) -> None:
         """Write the header. ``compression`` is ``zstd``, ``lz4`` or empty."""
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
@@ -84,7 +84,7 @@ class McapOutput:
             schema_count=0,
         )
         self._write(MAGIC)
-        self._write(record_bytes(Header(profile, library)))
+        self._write(record_bytes(Header("ros2", library)))
 
     def add_definition(self, record: Schema | Channel) -> None:
         """Write a schema or channel outside of chunks."""
@@ -117,23 +117,18 @@ class McapOutput:
         if not chunk.has_messages:
             return
         data = chunk.data
-        first_time, last_time = chunk.first_time, chunk.last_time
         packed = Chunk(
             compression=self._compression,
             data=self._compress(data),
-            message_start_time=first_time,
-            message_end_time=last_time,
+            message_start_time=chunk.first_time,
+            message_end_time=chunk.last_time,
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        self._add(packed, chunk, first_time, last_time)
+        self.add_packed_chunk(packed, chunk)
 
     def add_packed_chunk(self, packed: Chunk, chunk: ChunkBuilder) -> None:
         """Write a compressed chunk unchanged, with the index in ``chunk``."""
-        self._add(packed, chunk, chunk.first_time, chunk.last_time)
-
-    def _add(self, packed: Chunk, chunk: ChunkBuilder, first_time: int, last_time: int) -> None:
-        """Write a chunk and its index; its messages' log times are from ``first_time`` to ``last_time``."""
         start = self._output.tell()
         record = record_bytes(packed)
         length = len(record)
@@ -149,7 +144,7 @@ class McapOutput:
             parts.append(entries)
             length_of_indexes += _INDEX_HEAD.size + size
         self._write(b"".join(parts))
-        self._count(index, first_time, last_time)
+        self._count(index, chunk.first_time, chunk.last_time)
         self.statistics.chunk_count += 1
         ChunkIndex(
             message_start_time=packed.message_start_time,

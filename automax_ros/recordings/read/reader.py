@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import heapq
+import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cached_property
@@ -68,7 +69,8 @@ MAX_METADATA_BYTES = 4 << 20
 """Longest metadata.yaml that is read, in bytes (decision: a bound on memory for untrusted recordings)."""
 _MAX_YAML_NODES = 2_000_000
 """More keys and values than fit in MAX_METADATA_BYTES."""
-_MAX_FILES = 10_000
+MAX_FILES = 10_000
+_NUMBERED = re.compile(r"(.*?)_?(\d{1,9})\.mcap")
 _PROGRESS_MASK = 0x3FF
 """Progress is reported once per this many records."""
 
@@ -167,8 +169,7 @@ class BagReader:
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits, or its files overlap in time.
         """
-        for _, record in self._sourced():
-            yield record
+        return (record for _, record in self._sourced())
 
     def _sourced(self) -> Iterator[tuple[DataSource, RawMessage]]:
         """Yield the messages as stored in the files, each with its file."""
@@ -204,10 +205,7 @@ class BagReader:
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits.
         """
-        for file in self.files:
-            for record in McapFile(file).records(messages=False):
-                if isinstance(record, Attachment):
-                    yield record
+        return (record for record in self._beside_messages() if isinstance(record, Attachment))
 
     def metadata_records(self) -> Iterator[Metadata]:
         """Yield the metadata records of the mcap files.
@@ -215,10 +213,11 @@ class BagReader:
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits.
         """
+        return (record for record in self._beside_messages() if isinstance(record, Metadata))
+
+    def _beside_messages(self) -> Iterator[object]:
         for file in self.files:
-            for record in McapFile(file).records(messages=False):
-                if isinstance(record, Metadata):
-                    yield record
+            yield from McapFile(file).records(messages=False)
 
 
 def goes_backwards(file: Path, log_time: int, before: int) -> BagError:
@@ -280,7 +279,8 @@ class DataSource:
         """
         channel = self.channels.get(record.channel.id)
         if channel is None:
-            wanted = _is_wanted(record, topics, types)
+            type_name = record.schema.name if record.schema else ""
+            wanted = (topics is None or record.channel.topic in topics) and (types is None or type_name in types)
             channel = self.channels[record.channel.id] = ChannelReader(self.path, record.channel, record.schema, wanted)
         return channel
 
@@ -295,7 +295,9 @@ class ChannelReader:
         self._file = file
         self._decode: Callable[[bytes], Message] | None = None
         if wanted:
-            _check_encoding(file, channel)
+            if channel.message_encoding != "cdr":
+                text = f"the messages of {channel.topic[:247]} are in {channel.message_encoding[:40]!r}, not in CDR"
+                raise BagError("AMX6811", file, text)
             require_known(file, channel.topic, schema)
             self._decode = decoder(self.type_name)
 
@@ -324,20 +326,6 @@ class ChannelReader:
                 f"the message on {self.topic[:247]} at {log_time} ns is malformed: {error}",
                 "`automax bag repair` leaves such messages out",
             ) from error
-
-
-def _is_wanted(record: RawMessage, topics: Collection[str] | None, types: Collection[str] | None) -> bool:
-    type_name = record.schema.name if record.schema else ""
-    return (topics is None or record.channel.topic in topics) and (types is None or type_name in types)
-
-
-def _check_encoding(file: Path, channel: Channel) -> None:
-    if channel.message_encoding != "cdr":
-        raise BagError(
-            "AMX6811",
-            file,
-            f"the messages of {channel.topic[:247]} are in {channel.message_encoding[:40]!r}, not in CDR",
-        )
 
 
 def read_information(folder: Path) -> dict[str, Any]:
@@ -401,10 +389,16 @@ def load_yaml(path: object, text: bytes) -> Any:
         raise BagError("AMX6813", path, f"is not readable YAML: {error.reason}") from error
 
 
+def file_place(path: Path) -> tuple[str, int, str]:
+    """Return the sort key of a data file: files of one name are sorted by number."""
+    match = _NUMBERED.fullmatch(path.name)
+    return (match[1], int(match[2]), path.name) if match else (path.name, -1, path.name)
+
+
 def _data_files(folder: Path, information: dict[str, Any]) -> list[Path]:
     """Return the mcap files of a folder; refuse a name that leads out of it."""
     names = information.get("relative_file_paths")
-    if not isinstance(names, list) or not 0 < len(names) <= _MAX_FILES:
+    if not isinstance(names, list) or not 0 < len(names) <= MAX_FILES:
         raise BagError("AMX6813", folder / METADATA_FILE, "names no data files (relative_file_paths)")
     for name in names:
         if not isinstance(name, str) or "\0" in name or PurePath(name).name != name or name in {"", ".", ".."}:

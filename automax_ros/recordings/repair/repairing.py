@@ -8,7 +8,6 @@ not show what the rack did.
 from __future__ import annotations
 
 import copy
-import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,15 +17,13 @@ from pathlib import Path
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.recordings.mcap.errors import BagError, RecordingError
 from automax_ros.recordings.mcap.mcap_file import McapFile, RawMessage
-from automax_ros.recordings.mcap.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary
+from automax_ros.recordings.mcap.metadata import METADATA_FILE, BagMetadata
 from automax_ros.recordings.mcap.opening import NO_BAG_HINT, no_recording
-from automax_ros.recordings.read.reader import MAX_METADATA_BYTES, BagReader, read_information
+from automax_ros.recordings.read.reader import MAX_FILES, MAX_METADATA_BYTES, BagReader, file_place, read_information
 from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.repair.contents import FileContents, FileSequence, Provenance, topics_of
 from automax_ros.recordings.repair.rewriting import RepairWriter
 
-MAX_FILES = 10_000
-_NUMBERED = re.compile(r"(.*?)_?(\d{1,9})\.mcap")
 _MISSING_TOLD = 20
 _GAP_NS = NS_PER_S
 """Longest time between two files of one recording; a longer one is reported as a gap."""
@@ -86,17 +83,16 @@ class RepairReport:
         return told[0] if told else min((item.began for item in filled), default=0)
 
 
-def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float], None] | None = None) -> RepairReport:
+def repair(bag: Path, output: Path | None = None, tell: Callable[[float], None] = lambda _: None) -> RepairReport:
     """Check a recording, a folder or one .mcap file, and write a repaired one unless it is sound.
 
     ``output`` is the folder to write, ``<BAG>_repaired`` by default; if it is given, a sound recording is copied. The
-    default for one file of a recording's folder is next to that folder.
+    default for one file of a recording's folder is next to that folder. ``tell`` is called with the share that is done.
 
     Raises:
         BagError: there is no recording, or nothing in it can be used.
         RecordingError: the output exists already, is inside the recording's folder, or cannot be written.
     """
-    tell = on_progress or _tell_nobody
     target = output if output is not None else _default_output(bag)
     _require_outside(bag, target)
     report = RepairReport(bag)
@@ -119,10 +115,6 @@ def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float],
     report.output = target
     report.left = verdict_of(BagReader(target)).fault
     return report
-
-
-def _tell_nobody(share: float) -> None:
-    """Ignore the progress."""
 
 
 def _default_output(bag: Path) -> Path:
@@ -161,7 +153,7 @@ def _data_files(bag: Path, report: RepairReport) -> list[Path]:
         return [bag]
     if not bag.is_dir():
         raise no_recording(bag)
-    found = sorted((path for path in bag.iterdir() if path.suffix == ".mcap" and path.is_file()), key=_place)
+    found = sorted((path for path in bag.iterdir() if path.suffix == ".mcap" and path.is_file()), key=file_place)
     if not found:
         raise BagError("AMX6810", bag, "holds no .mcap file", NO_BAG_HINT)
     if len(found) > MAX_FILES:
@@ -178,18 +170,12 @@ def _data_files(bag: Path, report: RepairReport) -> list[Path]:
 
 def _numbered(found: list[Path]) -> list[str]:
     """Return the names that are missing in the numbering of a recording's files, up to the last one found."""
-    stem, last, _ = _place(found[-1])
-    numbers = {_place(path)[1] for path in found if _place(path)[0] == stem}
+    stem, last, _ = file_place(found[-1])
+    numbers = {file_place(path)[1] for path in found if file_place(path)[0] == stem}
     if last < 0 or last >= MAX_FILES or len(numbers) < len(found):
         return []
     prefix = found[-1].name.removesuffix(f"{last}.mcap")
     return [f"{prefix}{number}.mcap" for number in range(last) if number not in numbers]
-
-
-def _place(path: Path) -> tuple[str, int, str]:
-    """Return the sort key of a data file: files of one name are sorted by number."""
-    match = _NUMBERED.fullmatch(path.name)
-    return (match[1], int(match[2]), path.name) if match else (path.name, -1, path.name)
 
 
 def _is_ours(bag: Path, paths: list[Path]) -> bool:
@@ -216,6 +202,7 @@ def _examined(path: Path, provenance: Provenance, sequence: FileSequence | None)
     file = McapFile(path)
     contents = FileContents(path.name, channels=file.channels, schemas=file.schemas)
     before = copy.deepcopy(sequence)
+    damage: list[str] = []
     malformed = strays = 0
     first = first_stray = ""
     try:
@@ -232,17 +219,13 @@ def _examined(path: Path, provenance: Provenance, sequence: FileSequence | None)
                     first_stray = first_stray or f"{place}: {fault}"
             else:
                 provenance.take(record)
+        damage += [f"malformed messages: {malformed}, the first {first}"] if malformed else []
+        damage += [f"messages that do not follow on those before: {strays}, the first {first_stray}"] if strays else []
     except BagError as error:
-        return FileReport(path.name, _size(path), False, FileContents(path.name), [_told(error)], before=before)
-    damage = [f"malformed messages: {malformed}, the first {first}"] if malformed else []
-    damage += [f"messages that do not follow on those before: {strays}, the first {first_stray}"] if strays else []
+        damage = ["not finished: index and summary are missing" if error.code == "AMX6812" else error.message]
     if damage:
         return FileReport(path.name, _size(path), False, FileContents(path.name), damage, before=before)
     return FileReport(path.name, _size(path), True, contents)
-
-
-def _told(error: BagError) -> str:
-    return "not finished: index and summary are missing" if error.code == "AMX6812" else error.message
 
 
 def _size(path: Path) -> int:
@@ -318,11 +301,10 @@ def _write(
             shutil.copyfile(report.bag / METADATA_FILE, target / METADATA_FILE)
         else:
             _write_metadata(target, kept, report, provenance)
-    except OSError as error:
+    except BaseException as error:
         shutil.rmtree(target, ignore_errors=True)
-        raise _refused(target, error) from error
-    except BaseException:
-        shutil.rmtree(target, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise _refused(target, error) from error
         raise
 
 
@@ -365,18 +347,12 @@ def _write_metadata(target: Path, kept: list[FileReport], report: RepairReport, 
     if not report.sound:
         custom["repaired"] = "automax bag repair"
     files, topics = [item.summary() for item in contents], topics_of(contents)
-    text = _metadata_text(files, topics, custom)
     listed = len(topics)
-    while len(text.encode()) > MAX_METADATA_BYTES and listed:
-        listed = listed * MAX_METADATA_BYTES // (2 * len(text.encode()))
-        text = _metadata_text(files, topics[:listed], custom)
+    while len(text := BagMetadata(files, topics[:listed], custom).document().encode()) > MAX_METADATA_BYTES and listed:
+        listed = listed * MAX_METADATA_BYTES // (2 * len(text))
     if listed < len(topics):
         report.problems.append(f"{METADATA_FILE} lists {listed} of {len(topics)} topics: more of it nobody would read")
-    (target / METADATA_FILE).write_text(text, encoding="utf-8", newline="\n")
-
-
-def _metadata_text(files: list[FileSummary], topics: list[TopicSummary], custom: dict[str, str]) -> str:
-    return BagMetadata(files, topics, custom).document()
+    (target / METADATA_FILE).write_bytes(text)
 
 
 def _refused(target: Path, error: OSError) -> RecordingError:

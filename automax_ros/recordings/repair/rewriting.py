@@ -7,15 +7,14 @@ from collections.abc import Callable, Iterable, Sequence, Set
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
 import automax_ros
 from automax_ros.core.kinds import WriteKind
 from automax_ros.messages.cdr.cdr import CdrError, decode
 from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD, ChunkBuilder
-from automax_ros.recordings.mcap.chunk_table import WholeChunk
-from automax_ros.recordings.mcap.mcap_file import McapFile, chunk_records
+from automax_ros.recordings.mcap.chunk_table import MESSAGE, WholeChunk, chunk_records
+from automax_ros.recordings.mcap.mcap_file import McapFile
 from automax_ros.recordings.mcap.mcap_output import McapOutput
 from automax_ros.recordings.mcap.metadata import BagMetadata, yaml_text
 from automax_ros.recordings.repair.contents import SCAN, WRITE, FileContents, FileSequence, Provenance
@@ -48,7 +47,7 @@ def with_definitions(path: Path) -> McapFile:
             data = bytes(piece.data)
             with contextlib.suppress(ValueError):
                 for opcode, start, end in chunk_records(data):
-                    if opcode != Opcode.MESSAGE:
+                    if opcode != MESSAGE:
                         file.define(opcode, data[start:end])
     return file
 
@@ -133,7 +132,7 @@ class RepairWriter:
         with contextlib.suppress(ValueError):
             for opcode, start, end in chunk_records(data):
                 content = data[start:end]
-                if opcode != Opcode.MESSAGE:
+                if opcode != MESSAGE:
                     record = self._definitions.definition(opcode, content)
                     whole = whole and record is not None
                     inner |= {(type(record), record.id)} if record is not None else set()

@@ -66,9 +66,18 @@ def require_another_file(bag: Path, output: Path) -> None:
                 raise BagError("AMX6824", output, "belongs to the recording itself", "name another file")
 
 
-def unwritable(output: Path, error: OSError) -> BagError:
-    """Return the error for an output that cannot be written."""
-    return BagError("AMX6824", output, f"cannot be written: {error.strerror or error}")
+@contextlib.contextmanager
+def whole_output(output: Path) -> Iterator[Path]:
+    """Yield the path of an output to write to; it appears only when it is complete (``atomic_write``).
+
+    Raises:
+        BagError: it cannot be written.
+    """
+    try:
+        with atomic_write(output) as place:
+            yield place
+    except OSError as error:
+        raise BagError("AMX6824", output, f"cannot be written: {error.strerror or error}") from error
 
 
 def _whole(value: Cell) -> str:
@@ -132,30 +141,11 @@ class CommonTable:
         yield from self._series.changes()
 
 
-def export_csv(
-    bag: Path,
-    output: Path,
-    watch: Sequence[str] | None = None,
-    window: Window = WHOLE_RUN,
-    progress: Progress | None = None,
-) -> int:
-    """Write the watched variables of a recording to a CSV file; return the number of rows below the header.
-
-    Columns are ``time_s``, counted from the start of the run, and the variables with their type characters. A value
-    holds until it changes; a cell is empty until the recording contains a value for it. Booleans are 0 and 1.
-    Without ``watch`` all simple numeric and boolean variables are written; array elements are named like ``TABLE%(3)``.
-    Memory use does not grow with the recording.
-
-    Raises:
-        BagError: the recording cannot be read or has no common memory, a name in ``watch`` is unknown, the window is
-            empty, or the output cannot be written.
-    """
-    require_another_file(bag, output)
-    return write_csv(CommonTable(bag, watch, window, progress), output)
-
-
 def write_csv(table: Table, output: Path) -> int:
-    """Write a table to a CSV file, which appears only when it is complete; return the number of its rows.
+    """Write a table to a CSV file, which appears only when it is complete; return the number of rows below the header.
+
+    Columns are ``time_s``, counted from the start of the run, and those of the table. A value holds until it changes; a
+    cell is empty while it is unknown. Booleans are 0 and 1. Memory use does not grow with the recording.
 
     Raises:
         BagError: the recording is damaged, or the output cannot be written.
@@ -163,18 +153,12 @@ def write_csv(table: Table, output: Path) -> int:
     formats = [item.text for item in table.columns]
     cells = [""] * len(formats)
     count = 0
-    try:
-        with (
-            atomic_write(output) as place,
-            open(place, "w", encoding="utf-8", newline="", opener=open_at_once) as file,
-        ):
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow([TIME, *(item.label for item in table.columns)])
-            for time, changed in table.rows():
-                for index, value in changed.items():
-                    cells[index] = "" if value is None else formats[index](value)
-                writer.writerow([seconds_text(time), *cells])
-                count += 1
-    except OSError as error:
-        raise unwritable(output, error) from error
+    with whole_output(output) as place, open(place, "w", encoding="utf-8", newline="", opener=open_at_once) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([TIME, *(item.label for item in table.columns)])
+        for time, changed in table.rows():
+            for index, value in changed.items():
+                cells[index] = "" if value is None else formats[index](value)
+            writer.writerow([seconds_text(time), *cells])
+            count += 1
     return count

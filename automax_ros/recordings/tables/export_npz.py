@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from automax_ros.core.safe_file import atomic_write, open_at_once
+from automax_ros.core.safe_file import open_at_once
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.common_log import Cell
-from automax_ros.recordings.tables.export import TIME, Column, Table, unwritable
+from automax_ros.recordings.tables.export import TIME, Column, Table, whole_output
 
 MAX_BYTES = 256 << 20
 """Most bytes of all columns of an .npz export (decision): they are collected in memory."""
@@ -50,11 +50,8 @@ def write_npz(bag: Path, table: Table, output: Path) -> int:
     arrays.update((item.label, numbers.finished()) for item, numbers in zip(table.columns, columns, strict=True))
     arrays["names"] = np.array([TIME, *(item.label for item in table.columns)])
     arrays["units"] = np.array(["s", *(item.unit for item in table.columns)])
-    try:
-        with atomic_write(output) as place, open(place, "wb", opener=open_at_once) as file:
-            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]  # none is named allow_pickle
-    except OSError as error:
-        raise unwritable(output, error) from error
+    with whole_output(output) as place, open(place, "wb", opener=open_at_once) as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]  # none is named allow_pickle
     return len(times)
 
 

@@ -31,15 +31,12 @@ from automax_ros.recordings.read.common_log import (
 from automax_ros.recordings.read.reader import BagMessage, BagReader
 from automax_ros.recordings.read.run_facts import run_facts
 from automax_ros.recordings.read.span import span_of
-from automax_ros.recordings.tables.locals import WatchedLocals, is_local
-from automax_ros.recordings.tables.plant_columns import WatchedPlants, is_plant
+from automax_ros.recordings.tables.states import WatchedStates, states_for
 
 MAX_GRID_ROWS = 20_000_000
 """Most rows of an export on a grid of time (decision): a day at 5.5 ms has 15.7 million."""
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "VariableTable"))
 _SCAN = "automax_msgs/msg/Scan"
-_STATE = "automax_msgs/msg/TaskState"
-_PLANT = "automax_msgs/msg/PlantState"
 
 Change = tuple[int, dict[int, Cell]]
 """Nanoseconds from the start of the run, and the new values by index of column."""
@@ -98,14 +95,10 @@ class Series:
         self._reader.on_progress = progress
         self._take_scan, self._take_writes = take_scan, take_writes
         types = _TYPES | {_SCAN} if take_scan else _TYPES
-        if any(map(is_local, watch or ())):
-            types |= {_STATE}
-        if any(map(is_plant, watch or ())):
-            types |= {_PLANT}
-        self._messages = self._reader.messages(types=types)
+        self._messages = self._reader.messages(types=types | states_for(watch or ()))
         self._log = CommonLog(bag, run_facts(self._reader))
         table, variables = self._log.facts.table, self._log.variables
-        self._locals, self._plants = WatchedLocals(bag), WatchedPlants(bag)
+        self._states = WatchedStates(bag)
         self.columns: tuple[Watched, ...] = tuple(self._watched(variables, watch))
         self.rack = table.rack
         self.origin_ns = table.stamp
@@ -129,8 +122,7 @@ class Series:
         for change in self._on_grid(changes) if self._window.step_ns else changes:
             found = True
             yield change
-        self._locals.require_all()
-        self._plants.require_all()
+        self._states.require_all()
         if not found and self.columns:
             last = f"the recording ends at {seconds_text(self.end_ns)} s"
             start = seconds_text(self._window.start_ns)
@@ -142,10 +134,8 @@ class Series:
         watched: dict[str, Watched] = {}
         try:
             for name in watch:
-                if is_plant(name):
-                    item = self._plants.add(len(watched), name)
-                elif is_local(name):
-                    item = self._locals.add(len(watched), name)
+                if states_for([name]):
+                    item = self._states.add(len(watched), name)
                 else:
                     (item,) = watched_by_name(variables, [name])
                 watched.setdefault(item.label, item)
@@ -160,10 +150,8 @@ class Series:
             message = entry.message
             told: Iterable[tuple[int, Cell]] = ()
             entries: Iterable[Entry] | None = ()
-            if isinstance(message, TaskState):
-                told = self._locals.values(message)
-            elif isinstance(message, PlantState):
-                told = self._plants.values(message)
+            if isinstance(message, (TaskState, PlantState)):
+                told = self._states.values(message)
             elif isinstance(message, (CommonImage, CommonWrite)):
                 entries = self._log.take(message)
                 if self._take_writes is not None and entries and isinstance(message, CommonWrite):

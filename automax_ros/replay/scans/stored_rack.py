@@ -11,14 +11,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from mcap.records import Attachment
-
 from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.core.text import did_you_mean
 from automax_ros.language.checks.checker import CheckResult
 from automax_ros.language.program import CommonSpec, Program, lines_that_write
 from automax_ros.messages.types.messages import VariableTable
+from automax_ros.messages.types.rack_files import RACK_FILE
 from automax_ros.rackfile.checks.tasks import check_source, commons_of
 from automax_ros.rackfile.loader import load_stored
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
@@ -27,11 +26,9 @@ from automax_ros.rackfile.modules.processor import MAX_PROCESSORS
 from automax_ros.rackfile.modules.udc import DRIVES, MAX_UDCS
 from automax_ros.rackfile.reading.files import MAX_BYTES
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.mcap_file import McapFile
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.run_facts import sent_files
 
-_RACK_FILE = "rack.yaml"
 _SOURCE = re.compile(r"([A-Z][A-Z0-9_]{0,7})\.(?:BLK|BAS)")
 _MOST_SOURCES = MAX_PROCESSORS * MAX_TASKS + MAX_UDCS * len(DRIVES)
 MOST_RELOADS = 100
@@ -203,10 +200,8 @@ def stored_rack(reader: BagReader) -> StoredRack:
     """
     bag = reader.path
     stored = _StoredFiles(bag)
-    for path in reader.files:
-        for record in McapFile(path).records(messages=False):
-            if isinstance(record, Attachment):
-                stored.keep(record.name, record.data)
+    for record in reader.attachments():
+        stored.keep(record.name, record.data)
     if not stored.rack_file:
         for file in sent_files(reader):
             stored.keep(file.name, file.data)
@@ -216,8 +211,8 @@ def stored_rack(reader: BagReader) -> StoredRack:
             "topic /<rack>/config too"
         )
         raise BagError("AMX6830", bag, "has no rack.yaml inside, so its tasks cannot be executed again", hint)
-    source = SourceText(f"{bag.name}:{_RACK_FILE}", stored.rack_file)
-    result = load_stored(source, Path(_RACK_FILE))
+    source = SourceText(f"{bag.name}:{RACK_FILE}", stored.rack_file)
+    result = load_stored(source, Path(RACK_FILE))
     if result.config is None:
         raise SourceRefused([(source, result.diagnostics)])
     first = {name: texts[0] for name, texts in stored.sources.items()}
@@ -248,7 +243,7 @@ class _StoredFiles:
     def keep(self, name: str, data: bytes) -> None:
         """Keep the first rack file, or a task's source; a further one of a name ran after a reload."""
         match = _SOURCE.fullmatch(name)
-        if match is None and (name != _RACK_FILE or self.rack_file):
+        if match is None and (name != RACK_FILE or self.rack_file):
             return
         if len(data) > MAX_BYTES:
             raise BagError("AMX6814", self._bag, f"{name} inside has more than {MAX_BYTES} bytes")

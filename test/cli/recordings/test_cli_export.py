@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from recordings.recordings import sample_recording
 
-from automax_ros.recordings.tables.export import export_csv
+from automax_ros.recordings.tables.export import CommonTable, write_csv
 from cli.support import columns_of
 
 
@@ -17,7 +17,7 @@ def bag(automax):
 
 def test_export_writes_what_the_library_does(automax, bag):
     assert automax("export", bag, "--output", "OUT.csv") == (0, "", "")
-    export_csv(automax.folder / "bag", automax.folder / "BY_HAND.csv")
+    write_csv(CommonTable(automax.folder / "bag"), automax.folder / "BY_HAND.csv")
     assert (automax.folder / "OUT.csv").read_text() == (automax.folder / "BY_HAND.csv").read_text()
 
 

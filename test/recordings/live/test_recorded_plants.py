@@ -17,7 +17,7 @@ from automax_ros.recordings.live.topics import LiveTopics
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.playback import survey
 from automax_ros.recordings.read.reader import BagReader
-from automax_ros.recordings.tables.export import export_csv
+from automax_ros.recordings.tables.export import CommonTable, write_csv
 from automax_ros.recordings.tables.traces import traces
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.replay.engine import replay
@@ -115,7 +115,7 @@ def test_recorder_outside_takes_plants_that_the_graph_offers(tmp_path: Path) -> 
 def test_signals_are_columns_of_exports_and_lines_of_pictures(tmp_path: Path) -> None:
     bag = recorded(tmp_path)
     watch = ["unwind/SPEED_RPM", "REF%", "UNWIND/contactor", "UNWIND/bridge", "UNWIND/line_v"]
-    export_csv(bag, tmp_path / "out.csv", watch)
+    write_csv(CommonTable(bag, watch), tmp_path / "out.csv")
     header, *rows = (tmp_path / "out.csv").read_text().splitlines()
     assert header == "time_s,UNWIND/speed_rpm,REF%,UNWIND/contactor,UNWIND/bridge,UNWIND/line_v"
     assert [row.split(",")[0] for row in rows] == ["0", *(f"0.0{number}" for number in range(1, 10))]
@@ -139,6 +139,6 @@ def test_signals_are_columns_of_exports_and_lines_of_pictures(tmp_path: Path) ->
 def test_signal_that_is_not_there_is_told(tmp_path: Path, name: str, code: str, hint: str) -> None:
     bag = recorded(tmp_path)
     with pytest.raises(BagError) as caught:
-        export_csv(bag, tmp_path / "out.csv", [name])
+        write_csv(CommonTable(bag, [name]), tmp_path / "out.csv")
     assert caught.value.code == code
     assert hint in caught.value.hint

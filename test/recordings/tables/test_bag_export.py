@@ -15,7 +15,7 @@ from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.messages.types.messages import Int16, Values, Variable, VariableTable
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.tables.export import export_csv
+from automax_ros.recordings.tables.export import CommonTable, write_csv
 from recordings.recordings import MS, TABLE, image_of, record, sample_recording, write_of
 
 VARIABLES = "/line1/variables"
@@ -29,7 +29,7 @@ START = image_of(0, 0, {REF: 0, COUNT: 0, GAIN: 0, RUN: 0, NOTE: 0, **{(5, i): 0
 def exported(tmp_path: Path, messages: list[tuple[str, Any]], watch: list[str] | None = None) -> list[str]:
     tmp_path.mkdir(exist_ok=True)
     bag = record(tmp_path / "bag", messages, custom_data={"version": "0.1.0"})
-    rows = export_csv(bag, tmp_path / "out.csv", watch)
+    rows = write_csv(CommonTable(bag, watch), tmp_path / "out.csv")
     lines = (tmp_path / "out.csv").read_text().splitlines()
     assert len(lines) == rows + 1
     return lines
@@ -91,7 +91,7 @@ def test_later_images_count_and_older_messages_do_not(tmp_path: Path) -> None:
 
 
 def test_a_whole_recording(tmp_path: Path) -> None:
-    export_csv(sample_recording(tmp_path / "bag", seconds=1), tmp_path / "out.csv", ["REF%", "RUN@"])
+    write_csv(CommonTable(sample_recording(tmp_path / "bag", seconds=1), ["REF%", "RUN@"]), tmp_path / "out.csv")
     lines = (tmp_path / "out.csv").read_text().splitlines()
     # the first write repeats the zeros of the image
     expected = [f"{seconds_text((index + 1) * 5_500_000)},{index},{index % 2}" for index in range(1, 181)]
@@ -204,7 +204,7 @@ def test_a_table_that_no_rack_writes(tmp_path: Path, variable: Variable) -> None
 def test_an_output_that_cannot_be_written(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", LOG)
     with pytest.raises(BagError, match="AMX6824"):
-        export_csv(bag, tmp_path)
+        write_csv(CommonTable(bag), tmp_path)
 
 
 def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
@@ -212,7 +212,7 @@ def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
     for name, seconds in (("warm", 1), ("short", 4), ("long", 16)):
         bag = sample_recording(tmp_path / name, seconds=seconds)
         tracemalloc.start()
-        export_csv(bag, tmp_path / "out.csv")
+        write_csv(CommonTable(bag), tmp_path / "out.csv")
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[2] < 1.2 * peaks[1]

@@ -9,7 +9,7 @@ import pytest
 
 from automax_ros.messages.types.messages import TaskState
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.tables.export import export_csv
+from automax_ros.recordings.tables.export import CommonTable, write_csv
 from automax_ros.recordings.tables.series import Window
 from automax_ros.recordings.tables.traces import traces
 from recordings.independent import GOLDEN, decoded, nanoseconds
@@ -38,7 +38,7 @@ LOG = [
 def exported(
     folder: Path, watch: list[str], log: list[tuple[str, Any]] = LOG, window: Window | None = None
 ) -> list[str]:
-    export_csv(record(folder / "bag", log), folder / "out.csv", watch, window or Window())
+    write_csv(CommonTable(record(folder / "bag", log), watch, window or Window()), folder / "out.csv")
     return (folder / "out.csv").read_text().splitlines()
 
 

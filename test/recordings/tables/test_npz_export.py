@@ -18,7 +18,7 @@ from automax_ros.rackfile.loader import load
 from automax_ros.recordings.info.info import bag_info
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.tables import export_npz, series
-from automax_ros.recordings.tables.export import CommonTable, export_csv, write_csv
+from automax_ros.recordings.tables.export import CommonTable, write_csv
 from automax_ros.recordings.tables.export_npz import write_npz
 from automax_ros.recordings.tables.scan_table import ScanTable
 from automax_ros.recordings.tables.series import Window
@@ -50,7 +50,7 @@ def read_csv(path: Path) -> dict[str, list[str]]:
 
 def test_rows_are_those_of_the_csv_table(tmp_path: Path) -> None:
     arrays = npz(GOLDEN, tmp_path, CommonTable(GOLDEN))
-    export_csv(GOLDEN, tmp_path / "out.csv")
+    write_csv(CommonTable(GOLDEN), tmp_path / "out.csv")
     table = read_csv(tmp_path / "out.csv")
     assert list(arrays["names"]) == list(table)
     assert len(arrays["time_s"]) > 900
