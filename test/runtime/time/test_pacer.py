@@ -192,12 +192,12 @@ def test_default_waits_in_real_time():
     assert all(item >= 0 for item in late)
 
 
-def test_no_other_source_below_the_nodes_asks_a_clock():
+def test_no_other_source_below_ros_asks_a_clock():
     package = ROOT / "automax_ros"
     asking = {
         path.relative_to(package).as_posix()
         for path in package.rglob("*.py")
-        if path.relative_to(package).parts[0] not in {"nodes", "cli"}
+        if path.relative_to(package).parts[0] not in {"ros", "cli"}
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Import | ast.ImportFrom)
         for name in ([alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module])
