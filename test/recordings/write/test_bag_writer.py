@@ -52,7 +52,8 @@ def test_folders_of_different_names_hold_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_hash_seed_and_time_zone_do_not_matter(tmp_path: Path) -> None:
-    script = "import sys, pathlib; from recordings.recordings import sample_recording as s; s(pathlib.Path(sys.argv[1]))"
+    script = "import pathlib, sys; from recordings.recordings import sample_recording\n"
+    script += "sample_recording(pathlib.Path(sys.argv[1]))"
     digests = set()
     for seed, zone in (("1", "UTC"), ("4711", "Asia/Tokyo")):
         folder = tmp_path / seed
