@@ -145,11 +145,11 @@ class WholeChunk:
         definitions: list[Definition] = []
         try:
             for begin, end in zip(known[gaps].tolist(), begins[gaps].tolist(), strict=True):
-                between = chunk_records(self.data[begin:end])
-                definitions += (definition_at(self.data, begin + start - RECORD_HEAD.size) for _, start, _ in between)
+                for opcode, start, _ in chunk_records(self.data[begin:end]):
+                    if opcode == MESSAGE or len(definitions) == _MOST_DEFINITIONS:
+                        return None
+                    definitions.append(definition_at(self.data, begin + start - RECORD_HEAD.size))
         except ValueError:
-            return None
-        if len(definitions) > _MOST_DEFINITIONS or any(opcode == MESSAGE for _, opcode, _ in definitions):
             return None
         return ChunkTable(
             heads["channel"].astype(np.int64),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
+import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -105,6 +106,19 @@ def test_more_entries_than_a_chunk_can_hold_count_nothing(chunk: ChunkBuilder):
     for channel in range(3, 40):
         entries[channel] = list(entries[1])
     assert indexed(chunk, entries).table() is None
+
+
+def test_a_chunk_with_a_lying_index_takes_no_memory():
+    """Messages that no index tells are not collected before the chunk is given up."""
+    builder = ChunkBuilder()
+    for number in range(50_000):
+        builder.add_message(1, number, number, number, b"")
+    whole = indexed(builder, {1: index_of(builder)[1][:2]})
+    tracemalloc.start()
+    assert whole.table() is None
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2 * len(whole.data)
 
 
 def test_a_chunk_without_index_is_read_one_by_one(chunk: ChunkBuilder):
