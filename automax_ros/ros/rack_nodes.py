@@ -32,9 +32,11 @@ from types import TracebackType
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.utilities import get_default_context
 
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
@@ -65,6 +67,10 @@ from automax_ros.runtime.time.simulated_pacer import SimulatedTime
 
 LOOK_S = 0.02
 """Seconds between two checks whether the other processes are present."""
+DELIVERY_NS = NS_PER_S
+"""How long a rack that ends waits for its subscribers to have received its last messages (decision)."""
+DELIVERY_TO_RECORDER_NS = 5 * NS_PER_S
+"""The same for a process that began with its recorder, whose recording must be whole (decision)."""
 
 _Beginning = tuple[Sequence[tuple[str, Value]], "Callable[[], None] | None"]
 """The arguments of ``Rack.start``."""
@@ -138,6 +144,8 @@ class RackNodes:
             self.rack, self.stream, self._pacer, self._context, self.health, self._intake, arguments, lock=turns
         )
         self._begun = self._closed = False
+        recorded = seating is not None and seating.awaits_recorder
+        self._delivery_ns = DELIVERY_TO_RECORDER_NS if recorded else DELIVERY_NS
         self._thread: threading.Thread | None = None
         self.nodes = nodes_of(self._site)
         self._own: tuple[RackNode, ...] = ()
@@ -314,6 +322,8 @@ class RackNodes:
             self.rack.operations.stop_tasks()
             if self._begun:
                 self._send_last()
+        if self._begun:
+            self._deliver()
         if self._desk is not None:
             self._desk.close()
         nodes = (*self.nodes, *self._own)
@@ -329,6 +339,14 @@ class RackNodes:
         except Exception:
             if self._context.ok():  # else ROS was shut down, as rclpy's own handlers of signals do
                 raise
+
+    def _deliver(self) -> None:
+        """Wait until subscribers have received all: a writer that is destroyed sends nothing again."""
+        deadline_ns = time.monotonic_ns() + self._delivery_ns
+        for publisher in (publisher for node in self.nodes for publisher in node.publishers):
+            if not self._context.ok():
+                return
+            publisher.wait_for_all_acked(Duration(nanoseconds=max(0, deadline_ns - time.monotonic_ns())))
 
     def __enter__(self) -> RackNodes:
         """Return itself."""

@@ -1,5 +1,7 @@
 """A rack in somebody else's process: their context, their executor, their nodes next to it."""
 
+import os
+import signal
 import subprocess
 import sys
 import threading
@@ -317,3 +319,63 @@ def test_a_rack_scans_while_a_new_source_is_compiled(context, executor, monkeypa
         assert wrong.result().findings[0].startswith("LINE.BLK:1:")
         assert not told[-1].ok
     user.destroy_node()
+
+
+SMALL_BUFFER = """<?xml version="1.0" encoding="UTF-8"?>
+<dds><profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <transport_descriptors><transport_descriptor>
+    <transport_id>small</transport_id><type>UDPv4</type><receiveBufferSize>65500</receiveBufferSize>
+  </transport_descriptor></transport_descriptors>
+  <participant profile_name="small" is_default_profile="true"><rtps>
+    <userTransports><transport_id>small</transport_id></userTransports>
+    <useBuiltinTransports>false</useBuiltinTransports>
+  </rtps></participant>
+</profiles></dds>
+"""
+READER = """
+import time
+from rclpy.context import Context
+from rclpy.node import Node
+from automax_ros.messages.types.topics import SCAN
+from automax_ros.recordings.live.topics import TopicKind
+from automax_ros.messages.cdr.message_headers import scan_head
+from automax_ros.ros.clients.recorder import RawSubscription
+
+context = Context()
+context.init(args=[])
+node = Node("reader", context=context)
+source = RawSubscription(node, "/types/scans", TopicKind("automax_msgs/msg/Scan", SCAN))
+print("up", flush=True)
+last, is_known = {}, False
+while not is_known or node.count_publishers("/types/scans"):
+    for found in source.taken():
+        head = scan_head(found.payload)
+        is_known = is_known or print("receives", flush=True) is None
+        last[head.task] = head.scan
+    time.sleep(0.01)
+print(*(f"{task}={scan}" for task, scan in sorted(last.items())), flush=True)
+"""
+
+
+def test_a_rack_that_ends_waits_for_a_reader_that_is_late(context, ros_domain_id, tmp_path):
+    """What the reader's socket dropped while the reader was held up is sent again before the rack leaves the graph."""
+    from automax_ros.ros.rack_nodes import RackNodes
+
+    (tmp_path / "small.xml").write_text(SMALL_BUFFER)
+    environment = os.environ | {"FASTRTPS_DEFAULT_PROFILES_FILE": str(tmp_path / "small.xml")}
+    reader = subprocess.Popen([sys.executable, "-c", READER], stdout=subprocess.PIPE, text=True, env=environment)
+    try:
+        assert reader.stdout.readline() == "up\n"
+        with RackNodes(TYPES, context=context) as nodes:
+            scanned = nodes.rack.statistics["FAST"]
+            nodes.start()
+            assert reader.stdout.readline() == "receives\n"
+            reader.send_signal(signal.SIGSTOP)
+            before = scanned.scans
+            wait_until(lambda: scanned.scans > before + 100)
+            threading.Timer(0.3, reader.send_signal, (signal.SIGCONT,)).start()
+        last = dict(part.split("=") for part in reader.stdout.readline().split())
+        assert last == {name: str(item.scans) for name, item in nodes.rack.statistics.items()}
+    finally:
+        reader.kill()
+        reader.wait()

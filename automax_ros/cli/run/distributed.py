@@ -29,6 +29,8 @@ _SEATS, _HOME, _RECORDER = range(3)
 _RECORDER_NAME = "recorder"
 _RECORDER_WAIT_S = "60"
 """How long the recorder waits for the rack, whose processes take a while to start, s (decision)."""
+_RECORDER_AFTER_NS = 6 * NS_PER_S
+"""How long the recorder takes the last messages of common memory's process, which waits until they have arrived."""
 _WHOLE = "distributed"
 """The seat under which the supervising process holds the lock."""
 
@@ -64,7 +66,9 @@ def _posts(plan: RunPlan, seats: Sequence[RackProcess], arguments: argparse.Name
     if plan.record is not None:
         command = [*automax, "record", str(plan.config.path), "--output", str(plan.record), "--wait", _RECORDER_WAIT_S]
         command += [*_recording(arguments), *_ros(plan, arguments)]
-        yield ProcessSpec(_RECORDER_NAME, command, _RECORDER, reports=False, begins_run=True)
+        yield ProcessSpec(
+            _RECORDER_NAME, command, _RECORDER, reports=False, begins_run=True, after_ns=_RECORDER_AFTER_NS
+        )
     for seat in seats:
         own = ["--state", str(plan.state / seat.name)] if plan.state is not None else []
         own += ["--await-recorder"] if plan.record is not None else []

@@ -26,7 +26,7 @@ WINDOW_NS = 10 * NS_PER_S
 
 _LOOK_S = 0.05
 STAGE_NS = 800 * NS_PER_MS
-"""Time that the processes of a stage have to end before those of the next are asked to; all end within 2 s."""
+"""Time that the processes of a stage have to end before those of the next are asked to."""
 END_NS = 10 * NS_PER_S
 """A process that has not exited this long after SIGTERM is killed."""
 GRACE_NS = 2 * NS_PER_S
@@ -67,6 +67,7 @@ class ProcessSpec:
         ends_run: whether the run ends with it.
         reports: whether it sends a report when it ends cleanly; one that does not is never restarted.
         begins_run: whether the run of the processes with ``ends_run`` cannot begin without it.
+        after_ns: time that the processes of the stage before have to end before this one is asked to.
     """
 
     name: str
@@ -75,6 +76,7 @@ class ProcessSpec:
     ends_run: bool = False
     reports: bool = True
     begins_run: bool = False
+    after_ns: int = STAGE_NS
 
 
 class Listener(Protocol):
@@ -220,7 +222,8 @@ class Supervisor:
         """Begin to end all processes after ``grace_ns``; a second call does nothing."""
         if self._stage < 0:
             self._stage = 0
-            self._asked_ns = self._stage_ns = self._clock() + grace_ns
+            self._asked_ns = self._clock() + grace_ns
+            self._stage_ns = self._asked_ns - END_NS
             for place in self._places:
                 place.start_ns = None
 
@@ -229,13 +232,15 @@ class Supervisor:
         now = self._clock()
         if self._stage < 0 or now < self._asked_ns:
             return
-        alive = [(place.post.stage, place.child) for place in self._places if place.child is not None]
-        rest = [stage for stage, _ in alive if stage >= self._stage]
-        if rest and (now >= self._stage_ns or len(rest) == len(alive)):
-            for stage, child in alive:
-                if stage == min(rest):
-                    child.send(signal.SIGTERM)
-            self._stage, self._stage_ns = min(rest) + 1, now + STAGE_NS
+        alive = [(place.post, place.child) for place in self._places if place.child is not None]
+        rest = [(post, child) for post, child in alive if post.stage >= self._stage]
+        stage = min((post.stage for post, _ in rest), default=0)
+        due = [(post, child) for post, child in rest if post.stage == stage]
+        patience_ns = max((post.after_ns for post, _ in due), default=0)
+        if due and (now >= self._stage_ns + patience_ns or len(rest) == len(alive)):
+            for _, child in due:
+                child.send(signal.SIGTERM)
+            self._stage, self._stage_ns = stage + 1, now
         if now >= self._asked_ns + END_NS:
             for _, child in alive:
                 child.send(signal.SIGKILL)

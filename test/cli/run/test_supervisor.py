@@ -15,7 +15,8 @@ import pytest
 
 from automax_ros.cli.run.process_messages import ProcessOutput, Reported, TextLine, heard, tell_report
 from automax_ros.cli.run.status import Progress, Summary, merged_progress, merged_summary
-from automax_ros.cli.run.supervisor import BACKOFFS_NS, WINDOW_NS, ProcessSpec, Restarts, Supervisor
+from automax_ros.cli.run.supervisor import BACKOFFS_NS, STAGE_NS, WINDOW_NS, ProcessSpec, Restarts, Supervisor
+from automax_ros.core.ticks import NS_PER_S
 
 PATIENCE_S = 240.0
 REPORT = 'print(json.dumps({"report": {"ok": True}}), flush=True)'
@@ -114,6 +115,16 @@ def test_all_end_in_order_the_lowest_stage_first():
     assert sorted(down[:2]) == ["one", "two"]
     assert down[2:] == ["home", "recorder"]
     assert run.supervisor.codes == dict.fromkeys(("home", "one", "two", "recorder"), 0)
+
+
+def test_a_recorder_is_not_asked_to_end_before_a_process_that_takes_its_time():
+    """Its last messages come after more time than another stage is given."""
+    late = WAITS.replace('print("down"', f'time.sleep({STAGE_NS / NS_PER_S + 0.5})\nprint("down"')
+    recorder = ProcessSpec("recorder", program(WAITS), stage=2, reports=False, after_ns=600 * NS_PER_S)
+    with Supervised(ProcessSpec("home", program(late + REPORT), stage=1), recorder) as run:
+        run.heard.until(lambda heard: sum(text == "up" for _, text in heard.said) == 2)
+        run.stop()
+    assert [name for name, text in run.heard.said if text == "down"] == ["home", "recorder"]
 
 
 def test_a_process_that_was_killed_is_started_again_and_the_others_are_left_alone():
