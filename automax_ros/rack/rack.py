@@ -14,14 +14,16 @@ from collections.abc import Callable, Collection, Sequence
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
+from automax_ros.core.names import Element, NameFault
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
+from automax_ros.rack.base.local_names import LocalElement
 from automax_ros.rack.base.observers import Observers, RackObserver
 from automax_ros.rack.base.part import RackPart
 from automax_ros.rack.base.views import backplane_of, view_specs
 from automax_ros.rack.modules.building import build_module
 from automax_ros.rack.modules.module import Module, RackServices
-from automax_ros.rack.operations.forces import Force, ForceTable
+from automax_ros.rack.operations.forces import Force, ForceTable, Target
 from automax_ros.rack.operations.operations import Operations, begin_memory
 from automax_ros.rack.operations.values import ValueOperations
 from automax_ros.rack.plants.feeding import PlantFeeds
@@ -134,7 +136,7 @@ class Rack:
             elsewhere=self.part.elsewhere(self.memory, self.backplane),
         )
         self.adjust = ValueOperations(
-            config, self.operations, self.memory, self.inputs, self._forcing, self.scheduler, self.observers, self.tune
+            config, self.operations, self.memory, self.inputs, self._forcing, self.observers, self.tune
         )
 
     @property
@@ -277,9 +279,7 @@ class Rack:
                 be forced: a string, an array, a tunable, what the rack itself writes, or a register of which both the
                 word and bits are named (J2-3106-1 p. 18-10).
         """
-        self.memory.now_ns = self.now_ns
-        self._forcing.force(name, value, writer)
-        self._tell_force(name)
+        self._change_force(name, lambda target: self._forcing.force(target, value, writer))
 
     def unforce(self, name: str, writer: int = OPERATOR_WRITER) -> None:
         """End a force; the value stays until the next write.
@@ -287,14 +287,18 @@ class Rack:
         Raises:
             KeyError: the rack has no such variable.
         """
-        self.memory.now_ns = self.now_ns
-        self._forcing.release(name, writer)
-        self._tell_force(name)
+        self._change_force(name, lambda target: self._forcing.release(target, writer))
 
-    def _tell_force(self, name: str) -> None:
+    def _change_force(self, name: str, change: Callable[[Target], None]) -> None:
+        try:
+            target = self._forcing.local(name) if "." in name else Element(self.config.by_name[name])
+        except NameFault as fault:
+            raise KeyError(name) from fault
+        self.memory.now_ns = self.now_ns
+        change(target)
         self.observers.tell_writes()
-        if "." in name:
-            self.observers.tuned(self._forcing.local(name).task, self.now_ns)
+        if isinstance(target, LocalElement):
+            self.observers.tuned(target.task, self.now_ns)
 
     def forces(self) -> list[Force]:
         """Return the force table: variables and the values they are held at, in the order of the rack file."""

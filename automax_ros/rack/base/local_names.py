@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from automax_ros.core.names import Element, NameFault, element
 from automax_ros.core.text import quoted
-from automax_ros.core.types import DataType
+from automax_ros.core.types import DataType, Value
 from automax_ros.language.program import Symbol
 from automax_ros.language.tree.tree import Scope
 from automax_ros.runtime.tasks.task import Task
@@ -21,9 +21,20 @@ class LocalElement:
     element: Element[Symbol]
 
     @property
-    def symbol(self) -> Symbol:
+    def variable(self) -> Symbol:
         """The declaration."""
         return self.element.variable
+
+    @property
+    def value(self) -> Value:
+        """The present value."""
+        value = self.task.value(self.variable.name)
+        return value[self.element.index] if isinstance(value, list) else value
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the task still has this declaration: a reload brings others."""
+        return self.task.compiled.program.symbols.get(self.variable.name) is self.variable
 
     @property
     def label(self) -> str:
@@ -33,11 +44,11 @@ class LocalElement:
     @property
     def why_not_forced(self) -> str | None:
         """Why it cannot be forced; None for a simple local of any type but STRING (J2-3106-1 p. 18-10)."""
-        if self.symbol.dimensions:
+        if self.variable.dimensions:
             return "it is an element of an array"
-        if self.symbol.tuning is not None:
+        if self.variable.tuning is not None:
             return "it is a tunable"
-        return "it is a string" if self.symbol.type is DataType.STRING else None
+        return "it is a string" if self.variable.type is DataType.STRING else None
 
 
 def local_named(tasks: Iterable[Task], name: str) -> LocalElement:

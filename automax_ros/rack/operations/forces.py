@@ -10,15 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.names import PREDEFINED, NameFault
+from automax_ros.core.names import PREDEFINED, Element, NameFault
 from automax_ros.core.types import DataType, Value
 from automax_ros.language.tree.tree import Scope
 from automax_ros.rack.base.local_names import LocalElement, local_named
-from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.config import CommonElement, RackConfig
 from automax_ros.rackfile.reading.executive import most_forces, version_text
 from automax_ros.runtime.memory.memory import FORCING, CommonMemory
 from automax_ros.runtime.memory.views import MemoryValueError, ViewSpec, fitting
 from automax_ros.runtime.tasks.task import Task
+
+Target = CommonElement | LocalElement
+"""A variable that an operation means: a common or an element of one, or a task's own."""
 
 
 @dataclass(frozen=True)
@@ -59,32 +62,35 @@ class ForceTable:
         """
         return local_named(self._tasks(), name)
 
-    def force(self, name: str, value: Value, writer: int) -> None:
+    def targets(self) -> dict[str, Target]:
+        """Return the variables that are forced by their full names, in the order of ``table``."""
+        commons = [
+            Element(self._config.by_name[self._memory.specs[view].name]) for view, _ in sorted(self._memory.forced)
+        ]
+        own: list[Target] = [self.local(f"{task.name}.{name}") for task in self._tasks() for name in task.forces]
+        return {item.label: item for item in commons + own}
+
+    def force(self, target: Target, value: Value, writer: int) -> None:
         """Hold a variable at a value; one that is forced already gets the new value.
 
         Raises:
-            KeyError: the rack has no such variable.
             MemoryValueError: the value does not fit, the variable cannot be forced, or the most that may be are forced.
         """
-        if "." in name:
-            self._force_local(self._known(name), value, writer)
+        if isinstance(target, LocalElement):
+            self._force_local(target, value, writer)
             return
-        view = self._memory.view(name)
-        self._require(name, self._why_not(view) or self._too_many(again=self._memory.is_forced(view)))
+        view = self._memory.view(target.name)
+        self._require(target.name, self._why_not(view) or self._too_many(again=self._memory.is_forced(view)))
         self._memory.force(view, value, writer=writer)
 
-    def release(self, name: str, writer: int) -> None:
-        """End a force; the value stays until the next write.
-
-        Raises:
-            KeyError: the rack has no such variable.
-        """
-        if "." not in name:
-            self._memory.release(self._memory.view(name), writer=writer)
-            return
-        meant = self._known(name)
-        held = {known: value for known, value in meant.task.forces.items() if known != meant.symbol.name}
-        self._hold(meant.task, held, writer)
+    def release(self, target: Target, writer: int) -> None:
+        """End a force; the value stays until the next write."""
+        if isinstance(target, LocalElement):
+            own = target.variable.name
+            held = {name: value for name, value in target.task.forces.items() if name != own}
+            self._hold(target.task, held, writer)
+        else:
+            self._memory.release(self._memory.view(target.name), writer=writer)
 
     def release_all(self, writer: int) -> None:
         """End all forces."""
@@ -106,7 +112,7 @@ class ForceTable:
         self._memory.note_locals(forced=self._any_local(), told=False)
 
     def _force_local(self, meant: LocalElement, value: Value, writer: int) -> None:
-        symbol, forces = meant.symbol, meant.task.forces
+        symbol, forces = meant.variable, meant.task.forces
         reason = meant.why_not_forced or meant.task.why_not_forced(symbol.name, symbol.scope)
         self._require(meant.label, reason or self._too_many(again=symbol.name in forces))
         fit = fitting(ViewSpec(meant.label, symbol.type), value)
@@ -118,12 +124,6 @@ class ForceTable:
 
     def _any_local(self) -> bool:
         return any(task.forces for task in self._tasks())
-
-    def _known(self, name: str) -> LocalElement:
-        try:
-            return self.local(name)
-        except NameFault as fault:
-            raise KeyError(name) from fault
 
     def _require(self, name: str, reason: str | None) -> None:
         if reason is not None:
@@ -158,4 +158,4 @@ def _may_be_held(task: Task, name: str) -> bool:
         meant = local_named([task], f"{task.name}.{name}")
     except NameFault:
         return False
-    return meant.why_not_forced is None and task.why_not_forced(name, meant.symbol.scope) is None
+    return meant.why_not_forced is None and task.why_not_forced(name, meant.variable.scope) is None

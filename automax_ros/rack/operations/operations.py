@@ -29,6 +29,7 @@ from automax_ros.runtime.tasks.task import Status
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 
 __all__ = ["KEEP_STATE", "OperationRefused", "Operations"]
+POWER_OFF = "the power is off: switch it on first"
 _POWER = EventKey(EventClass.OUTSIDE, 0, "power")
 
 
@@ -48,11 +49,37 @@ def write_status(config: RackConfig, modules: Sequence[Module], memory: CommonMe
             memory.write_from_outside(view, shown[spec.name], PRESET_WRITER)
 
 
+class OperationReports:
+    """Reports operations to a rack's observers, refused ones too."""
+
+    def __init__(self, observers: Observers, scheduler: Scheduler) -> None:
+        """Create for one rack."""
+        self._observers, self._scheduler = observers, scheduler
+
+    def done(self, what: str, task: str = "", *, reason: str = "", detail: str = "") -> None:
+        """Report an operation that was carried out."""
+        self._observers.operated(Operation(self._scheduler.now_ns, what, task, True, reason, detail))
+
+    def failed(self, what: str, reason: str, task: str = "", detail: str = "") -> None:
+        """Report an operation that was not carried out."""
+        self._observers.operated(Operation(self._scheduler.now_ns, what, task, False, reason, detail))
+
+    def refuse(self, what: str, reason: str, task: str = "", detail: str = "") -> NoReturn:
+        """Report a refusal.
+
+        Raises:
+            OperationRefused: always, with the reason.
+        """
+        self.failed(what, reason, task, detail)
+        raise OperationRefused(reason)
+
+
 class Operations:
     """Operates one rack. ``stopped`` is the cause of a STOP ALL, None while the rack runs.
 
     ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that cannot run until they are
-    reloaded; ``battery_good`` is the value of BATTERYSTATUSn@. ``installation`` prepares sources for ``install``.
+    reloaded; ``battery_good`` is the value of BATTERYSTATUSn@. ``installation`` prepares sources for ``install``,
+    ``reports`` notifies observers.
     """
 
     def __init__(
@@ -74,6 +101,7 @@ class Operations:
         self._events, self._channels = events, channels
         self._config, self._modules, self.installation = config, modules, installation
         self._memory, self._scheduler, self._observers = memory, scheduler, observers
+        self.reports = OperationReports(observers, scheduler)
         self._tasks = {item.task.name: item for module in modules for item in module.tasks}
         self._ticks = {item.task.name: module.config.tick_ns for module in modules for item in module.tasks}
         self._critical = {task.name for _, task in config.placed_tasks if task.critical}
@@ -85,6 +113,11 @@ class Operations:
         self._power_event: ScheduledEvent | None = None
         self.powered = self.battery_good = True
         self.stopped: StopCause | None = None
+
+    @property
+    def now_ns(self) -> int:
+        """Rack time."""
+        return self._scheduler.now_ns
 
     @property
     def stop_reason(self) -> str | None:
@@ -119,12 +152,12 @@ class Operations:
         """
         task = self.find("run", name)
         if self._runs(task):
-            self._refuse("run", name, f"task {name} runs already")
+            self.reports.refuse("run", f"task {name} runs already", name)
         if name in self.deleted:
-            self._refuse("run", name, f"task {name} was deleted: reload it first")
+            self.reports.refuse("run", f"task {name} was deleted: reload it first", name)
         self._refuse_faulted("run", [task])
         self._run_together([task], self._next_tick)
-        self._tell("run", name)
+        self.reports.done("run", name)
 
     def run_all(self) -> None:
         """Put all tasks that do not run into RUN, in the order of priority and name, except deleted ones.
@@ -132,11 +165,11 @@ class Operations:
         Raises:
             OperationRefused: a task has faulted and its error log was not cleared since, or the power is off.
         """
-        self._need_power("run_all")
+        self.need_power("run_all")
         resting = [item for item in self._in_starting_order() if item.name not in self.deleted and not self._runs(item)]
         self._refuse_faulted("run_all", resting)
         self._run_together(resting, self._next_tick)
-        self._tell("run_all")
+        self.reports.done("run_all")
 
     def stop(self, name: str) -> None:
         """Stop a task; its locals keep the values of its last whole scan. Do nothing to one that does not run.
@@ -148,7 +181,7 @@ class Operations:
         self._refuse_critical("stop", item)
         item.stop()
         self._beginning.discard(name)
-        self._tell("stop", name)
+        self.reports.done("stop", name)
 
     def stop_tasks(self) -> None:
         """Stop all tasks; memory is unchanged."""
@@ -165,7 +198,7 @@ class Operations:
         Raises:
             OperationRefused: the power is off.
         """
-        self._need_power("stop_all")
+        self.need_power("stop_all")
         self.stopped = StopCause(self._scheduler.now_ns, reason, code, task)
         self.stop_tasks()
         self._events.clear()
@@ -173,7 +206,7 @@ class Operations:
         self._clear_memory(keep_non_volatile=True)
         for module in self._modules:
             module.stopped_all()
-        self._tell("stop_all", task, reason=reason, detail=code or "")
+        self.reports.done("stop_all", task, reason=reason, detail=code or "")
 
     def clear_errors(self, name: str | None = None) -> None:
         """Clear the error log of a task or of all; a faulted task becomes a stopped one, which can be put into RUN.
@@ -181,13 +214,13 @@ class Operations:
         Raises:
             OperationRefused: there is no such task, or the power is off.
         """
-        self._need_power("clear_errors")
+        self.need_power("clear_errors")
         cleared = list(self._tasks.values()) if name is None else [self.find("clear_errors", name)]
         for item in cleared:
             item.task.clear_errors()
             if item.task.status is Status.FAULTED:
                 item.task.status = Status.STOPPED
-        self._tell("clear_errors", name or "")
+        self.reports.done("clear_errors", name or "")
 
     def reload(self, name: str, source: SourceText, *, keep_state: bool = False) -> None:
         """Replace a task's source while the others run: an installation, so locals are 0, tunables as the source says.
@@ -225,7 +258,7 @@ class Operations:
         try:
             compiled = self.installation.take(prepared)
         except RackError as error:
-            self._tell("reload", name, ok=False, reason=str(error))
+            self.reports.failed("reload", str(error), name)
             raise
         ran = item.task.status is Status.RUNNING
         item.stop()  # A scan in progress is abandoned first: only then the task's values are consistent.
@@ -235,7 +268,7 @@ class Operations:
             carry_over(before, values, item.task)
         released = self._hold_again(item, forces)
         self.deleted -= {name}
-        self._tell("reload", name, detail=KEEP_STATE if keep_state else "")
+        self.reports.done("reload", name, detail=KEEP_STATE if keep_state else "")
         self._tell_released(item, released)
         if ran:
             self._run_together([item], self._next_tick)
@@ -248,14 +281,14 @@ class Operations:
         """
         item = self.find("delete", name)
         if self._runs(item):
-            self._refuse("delete", name, f"task {name} runs: stop it first")
+            self.reports.refuse("delete", f"task {name} runs: stop it first", name)
         if name in self.deleted:
-            self._refuse("delete", name, f"task {name} was deleted already")
+            self.reports.refuse("delete", f"task {name} was deleted already", name)
         released = [f"{name}.{local}" for local in item.task.forces]
         item.install(item.task.compiled, item.source)
         self._hold_again(item, {})
         self.deleted |= {name}
-        self._tell("delete", name)
+        self.reports.done("delete", name)
         self._tell_released(item, released)
 
     def power(self, off_for_ns: int, *, battery: bool = True) -> None:
@@ -277,7 +310,7 @@ class Operations:
             OperationRefused: it is off already.
         """
         if not self.powered:
-            self._refuse("power_off", "", "the power is off already")
+            self.reports.refuse("power_off", "the power is off already")
         self.ran_at_power_off = frozenset(name for name, item in self._tasks.items() if self._runs(item))
         self._beginning.clear()
         self.powered = False
@@ -286,7 +319,7 @@ class Operations:
         self._events.clear()
         self._channels.clear()
         self._clear_memory(keep_non_volatile=True)
-        self._tell("power_off")
+        self.reports.done("power_off")
 
     def power_on(self, *, battery: bool = True, auto_run: bool | None = None) -> None:
         """Switch the power on again.
@@ -300,7 +333,7 @@ class Operations:
             OperationRefused: it is on.
         """
         if self.powered:
-            self._refuse("power_on", "", "the power is on")
+            self.reports.refuse("power_on", "the power is on")
         self._expect_power(None)
         self.powered, self.battery_good = True, battery
         if not battery:
@@ -312,7 +345,7 @@ class Operations:
                 item.install(item.task.compiled, item.source)
         for module in self._modules:
             module.power_on()
-        self._tell("power_on")
+        self.reports.done("power_on")
         if self._config.auto_run if auto_run is None else auto_run:
             again = [item for item in self._in_starting_order() if item.task.name in self.ran_at_power_off]
             self._run_together(again, self._next_tick)
@@ -381,21 +414,26 @@ class Operations:
 
     def _tell_released(self, item: ScheduledTask, names: Sequence[str]) -> None:
         if names:
-            self._tell("unforce", item.name, detail=" ".join(names))
+            self.reports.done("unforce", item.name, detail=" ".join(names))
 
-    def _need_power(self, what: str, task: str = "") -> None:
+    def need_power(self, what: str, task: str = "") -> None:
+        """Refuse an operation while the power is off.
+
+        Raises:
+            OperationRefused: it is off.
+        """
         if not self.powered:
-            self._refuse(what, task, "the power is off: switch it on first")
+            self.reports.refuse(what, POWER_OFF, task)
 
     def _refuse_critical(self, what: str, item: ScheduledTask) -> None:
         if item.name in self._critical and self._runs(item):
             why = "is critical, it does not stop alone: STOP ALL stops it with all others"
-            self._refuse(what, item.name, f"task {item.name} {why}")
+            self.reports.refuse(what, f"task {item.name} {why}", item.name)
 
     def _refuse_faulted(self, what: str, tasks: Sequence[ScheduledTask]) -> None:
         faulted = [item.name for item in tasks if item.task.status is Status.FAULTED]
         if faulted:
-            self._refuse(what, faulted[0], f"a fault has stopped {' '.join(faulted)}: clear the error log first")
+            self.reports.refuse(what, f"a fault has stopped {' '.join(faulted)}: clear the error log first", faulted[0])
 
     def find(self, what: str, name: str) -> ScheduledTask:
         """Return the task of an operation.
@@ -403,16 +441,9 @@ class Operations:
         Raises:
             OperationRefused: there is no such task, or the power is off.
         """
-        self._need_power(what, name)
+        self.need_power(what, name)
         item = self._tasks.get(name)
         if item is None:
             hint = did_you_mean(name, self._tasks) or f"it has {', '.join(self._tasks)}"
-            self._refuse(what, name, f"the rack has no task {quoted(name)}: {hint}")
+            self.reports.refuse(what, f"the rack has no task {quoted(name)}: {hint}", name)
         return item
-
-    def _tell(self, what: str, task: str = "", *, ok: bool = True, reason: str = "", detail: str = "") -> None:
-        self._observers.operated(Operation(self._scheduler.now_ns, what, task, ok, reason, detail))
-
-    def _refuse(self, what: str, task: str, reason: str) -> NoReturn:
-        self._tell(what, task, ok=False, reason=reason)
-        raise OperationRefused(reason)

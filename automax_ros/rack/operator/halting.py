@@ -13,8 +13,7 @@ from typing import NoReturn, Protocol, runtime_checkable
 
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.rack.base.observers import HALT, RESUME, STEP, Operation
-from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.base.observers import HALT, RESUME, STEP
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.tasks.task import Status
 
@@ -63,7 +62,7 @@ class Halting:
 
     def __init__(self, rack: Rack, pace: object) -> None:
         """Create from a rack and its pacer."""
-        self._rack, self._pace = rack, pace
+        self._rack, self._pace, self._reports = rack, pace, rack.operations.reports
 
     @property
     def halted(self) -> bool:
@@ -77,20 +76,20 @@ class Halting:
         follows another's clock can be halted only by that clock.
         """
         if not self._rack.part.is_whole:
-            self._refuse(HALT, "the rack runs in several processes, which do not halt together")
+            self._reports.refuse(HALT, "the rack runs in several processes, which do not halt together")
         pace = self._haltable(HALT)
         if pace.halted:
-            self._refuse(HALT, "the rack is halted already")
+            self._reports.refuse(HALT, "the rack is halted already")
         pace.halt()
-        self._tell(HALT)
+        self._reports.done(HALT)
 
     def resume(self) -> None:
         """Continue rack time from where it is frozen."""
         pace = self._haltable(RESUME)
         if not pace.halted:
-            self._refuse(RESUME, "the rack is not halted")
+            self._reports.refuse(RESUME, "the rack is not halted")
         pace.resume()
-        self._tell(RESUME)
+        self._reports.done(RESUME)
 
     def step(self, what: str, task: str = "", count: int = 1, until_ns: int = 0) -> Stepped:
         """Execute scans or ticks, or run until a rack time: ``scan``, ``tick``, ``until``.
@@ -103,21 +102,25 @@ class Halting:
             "until": lambda: self._until(until_ns),
         }
         if what not in steps:
-            self._refuse(STEP, f"{quoted(what)} is not a step: {near_or_listed(what, list(steps))}")
+            self._refuse(f"{quoted(what)} is not a step: {near_or_listed(what, list(steps))}")
         if not self.halted:
-            self._refuse(STEP, "the rack is not halted: pause it first")
+            self._refuse("the rack is not halted: pause it first")
         if count < 1:
-            self._refuse(STEP, f"{count} steps cannot be made")
-        self._tell(STEP, detail=f"until {until_ns / NS_PER_S:.9g} s" if what == "until" else f"{count} {what} {task}")
+            self._refuse(f"{count} steps cannot be made")
+        self._reports.done(
+            STEP, detail=f"until {until_ns / NS_PER_S:.9g} s" if what == "until" else f"{count} {what} {task}".strip()
+        )
         return steps[what]()
 
     def _scans(self, task: str, count: int) -> Stepped:
         items = [item for item in self._rack.scheduled if task in ("", item.name)]
         if not items:
             known = [item.name for item in self._rack.scheduled]
-            self._refuse(STEP, f"the rack has no task {quoted(task)}: {near_or_listed(task, known)}")
+            self._refuse(f"the rack has no task {quoted(task)}: {near_or_listed(task, known)}")
         if all(item.task.status is not Status.RUNNING for item in items):
-            self._refuse(STEP, f"{f'task {task} does not run' if task else 'no task runs'}: put it into RUN first")
+            self._reports.refuse(
+                STEP, f"{f'task {task} does not run' if task else 'no task runs'}: put it into RUN first"
+            )
         wanted = sum(item.statistics.scans for item in items) + count
         return self._go(LONGEST_STEP_NS, lambda: sum(item.statistics.scans for item in items) >= wanted)
 
@@ -126,17 +129,21 @@ class Halting:
         if task:
             modules = [module for module in modules if task in {item.name for item in module.tasks}]
         if not modules:
-            self._refuse(STEP, f"the rack has no task {quoted(task)}" if task else "the rack has no module with tasks")
+            self._reports.refuse(
+                STEP, f"the rack has no task {quoted(task)}" if task else "the rack has no module with tasks"
+            )
         for_ns = count * modules[0].config.tick_ns
         if for_ns > LONGEST_STEP_NS:
-            self._refuse(STEP, f"{count} ticks are {for_ns / NS_PER_S:g} s: a step lasts at most 1 s")
+            self._refuse(f"{count} ticks are {for_ns / NS_PER_S:g} s: a step lasts at most 1 s")
         return self._go(for_ns, None)
 
     def _until(self, until_ns: int) -> Stepped:
         for_ns = until_ns - self._rack.now_ns
         if not 0 < for_ns <= LONGEST_STEP_NS:
             now_s = self._rack.now_ns / NS_PER_S
-            self._refuse(STEP, f"{until_ns / NS_PER_S:.9g} s is not within 1 s after {now_s:.9g} s, which it is now")
+            self._reports.refuse(
+                STEP, f"{until_ns / NS_PER_S:.9g} s is not within 1 s after {now_s:.9g} s, which it is now"
+            )
         return self._go(for_ns, None)
 
     def _go(self, for_ns: int, is_done: Callable[[], bool] | None) -> Stepped:
@@ -158,12 +165,8 @@ class Halting:
 
     def _haltable(self, what: str) -> Haltable:
         if not isinstance(self._pace, Haltable):
-            self._refuse(what, "the rack follows another's clock: halt that")
+            self._reports.refuse(what, "the rack follows another's clock: halt that")
         return self._pace
 
-    def _tell(self, what: str, detail: str = "") -> None:
-        self._rack.observers.operated(Operation(self._rack.now_ns, what, detail=detail.strip()))
-
-    def _refuse(self, what: str, reason: str) -> NoReturn:
-        self._rack.observers.operated(Operation(self._rack.now_ns, what, ok=False, reason=reason))
-        raise OperationRefused(reason)
+    def _refuse(self, reason: str) -> NoReturn:
+        self._reports.refuse(STEP, reason)

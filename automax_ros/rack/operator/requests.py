@@ -1,47 +1,47 @@
-"""Requests of an operator to a rack in words: names and values as texts, from services and commands.
+"""The requests of an operator to a rack: names and values as texts, from services; one table has all of them.
 
 Text that cannot be parsed is refused with a reason, and observers receive the refusal, as they do the rack's own.
-Values are read by names and patterns, as a program writes them and in their units. Everything but ``prepare`` must be
-called between two scans.
+Everything but ``prepare`` must be called between two scans.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import translate
+from enum import Enum, auto
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
-from automax_ros.compile.base.layout import Role, StateField
+from automax_ros.compile.base.layout import Role
 from automax_ros.core.diagnostics import SourceText, render
-from automax_ros.core.names import NameFault, element_name
-from automax_ros.core.text import near_or_listed, printable, quoted
-from automax_ros.core.ticks import seconds_ns
-from automax_ros.core.types import DataType, Value, type_of_name
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.text import count_of, printable, quoted
+from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import source_text, value_of, wanted
-from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.base.local_names import LocalElement
 from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.operations.forces import Target
+from automax_ros.rack.operator.faults import DriveTrips, displays_of
+from automax_ros.rack.operator.halting import Halting
+from automax_ros.rack.operator.readings import MAX_NAME, MAX_NAMES, Reading, Readings
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import PreparedReload, RackError
-from automax_ros.rackfile.model.config import CommonVariable
-from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.reading.files import MAX_BYTES
+from automax_ros.runtime.tasks.task import Status
 
 MAX_VALUE = 1000
-"""Longest text of a value that is accepted, in characters (decision: likewise)."""
+"""Longest text of a value that is accepted, in characters (decision: a bound on what strangers send)."""
 MOST_OFF_S = 86_400
 """Longest time for which the power is switched off, s (decision: a day)."""
+PLACES = ("first", "second", "last")
+"""The entries that the error log keeps."""
+DELETED = "deleted"
 _MOST_FINDINGS = 100
 
-
-MAX_NAME = 100
-"""Longest name that is accepted, in characters (decision: a bound on what strangers send)."""
-MAX_NAMES = 1000
-"""Most names in one request, and most values that its patterns mean (decision: likewise)."""
-_WILD = "*?"
+Fields = Mapping[str, Any]
+"""Fields of an answer; those of a list of messages are mappings again."""
 
 
 class ReloadRefused(OperationRefused):
@@ -53,15 +53,20 @@ class ReloadRefused(OperationRefused):
 
 
 class OperatorRequests:
-    """Executes an operator's requests to one rack.
+    """Executes an operator's requests to one rack. Arguments have the names of the requests' fields.
+
+    Methods return the fields of the answer that the execution determines. Those named ``..._now`` return what is true
+    afterwards, for the same arguments.
 
     Raises:
         OperationRefused: all methods, if the rack refuses or a text cannot be parsed.
     """
 
-    def __init__(self, rack: Rack) -> None:
-        self._rack = rack
-        self._readings = Readings(rack)
+    def __init__(self, rack: Rack, pace: object = None) -> None:
+        """Create for a rack and its pacer, if it has one."""
+        self._rack, self._reports = rack, rack.operations.reports
+        self._readings, self._halting = Readings(rack), Halting(rack, pace)
+        self._trips = DriveTrips(rack)
 
     def run(self, task: str) -> None:
         """Put a task into RUN."""
@@ -71,6 +76,22 @@ class OperatorRequests:
         """Stop a task."""
         self._rack.operations.stop(self._task("stop", task))
 
+    def delete(self, task: str) -> None:
+        """Delete a resting task; a reload brings it back."""
+        self._rack.operations.delete(self._task("delete", task))
+
+    def clear_errors(self, task: str = "") -> None:
+        """Clear the error log of a task, or of all without a name."""
+        self._rack.operations.clear_errors(self._task("clear_errors", task) if task.strip() else None)
+
+    def task_now(self, task: str, **_: object) -> Fields:
+        """Return the status of a task; nothing for an empty name."""
+        if not task.strip():
+            return {}
+        (name,) = self.tasks_named(task)
+        deleted = name in self._rack.operations.deleted
+        return {"status": DELETED if deleted else self._rack.task(name).status.value}
+
     def run_all(self) -> None:
         """Put all tasks into RUN."""
         self._rack.operations.run_all()
@@ -79,13 +100,35 @@ class OperatorRequests:
         """Stop the rack."""
         self._rack.operations.stop_all("STOP ALL by the operator")
 
-    def clear_errors(self, task: str = "") -> None:
-        """Clear the error log of a task, or of all without a name."""
-        self._rack.operations.clear_errors(self._task("clear_errors", task) if task.strip() else None)
+    def running_now(self) -> Fields:
+        """Return how many tasks run."""
+        return {"message": f"{self._running} of {count_of(len(self._rack.tasks), 'task')} run"}
 
-    def delete(self, task: str) -> None:
-        """Delete a resting task; a reload brings it back."""
-        self._rack.operations.delete(self._task("delete", task))
+    def pause(self) -> None:
+        """Halt the rack."""
+        self._halting.halt()
+
+    def resume(self) -> None:
+        """Let a halted rack continue."""
+        self._halting.resume()
+
+    def time_now(self) -> Fields:
+        """Return whether rack time runs."""
+        stands = "stands still" if self._halting.halted else "goes on"
+        return {"message": f"rack time {stands} at {self._now_s:.9g} s"}
+
+    def step(self, what: str, task: str = "", count: int = 1, until_s: float = 0.0) -> Fields:
+        """Execute scans or ticks of a halted rack, one for a ``count`` of 0, or run until a rack time."""
+        try:
+            until_ns = seconds_ns(until_s) if what == "until" else 0
+        except ValueError as error:
+            raise OperationRefused(str(error)) from error
+        stepped = self._halting.step(what, self._task("step", task), count or 1, until_ns)
+        return {"why": stepped.why, "scans": stepped.scans, "time_s": self._now_s}
+
+    def step_now(self, **_: object) -> Fields:
+        """Return the rack time."""
+        return {"time_s": self._now_s}
 
     def power(self, what: str, off_for_s: float = 0.0, *, without_battery: bool = False) -> None:
         """Switch the power ``off``, ``on``, or off for a time: ``cycle``."""
@@ -96,19 +139,31 @@ class OperatorRequests:
         elif switched == "on":
             operations.power_on(battery=battery)
         elif switched != "cycle":
-            self._refuse("power", f"{quoted(what)} is not off, on or cycle")
+            self._reports.refuse("power", f"{quoted(what)} is not off, on or cycle")
         elif not 0.0 <= off_for_s <= MOST_OFF_S:
-            self._refuse("power", f"the power cannot be off for {off_for_s:g} s: it takes 0 to {MOST_OFF_S}")
+            self._reports.refuse("power", f"the power cannot be off for {off_for_s:g} s: it takes 0 to {MOST_OFF_S}")
         else:
             operations.power(seconds_ns(off_for_s), battery=battery)
 
-    def set(self, name: str, value: str) -> None:
-        """Write a common or an array's element once."""
-        self._rack.adjust.set(name, self._common_value("set", name, value))
+    def power_now(self, **_: object) -> Fields:
+        """Return whether the power is on."""
+        return {"powered": self._rack.operations.powered}
 
-    def force(self, name: str, value: str) -> None:
+    def set(self, name: str, value: str) -> Fields:
+        """Write a common or an array's element once."""
+        return self._give("set", name, value, self._rack.adjust.set)
+
+    def force(self, name: str, value: str) -> Fields:
         """Hold a common, or a task's own variable (``TASK.NAME``), at a value."""
-        self._rack.adjust.force(name, self._common_value("force", name, value))
+        return self._give("force", name, value, self._rack.adjust.force)
+
+    def tune(self, name: str, value: str) -> Fields:
+        """Set a tunable, ``TASK.NAME``."""
+        return self._give("tune", name, value, self._rack.adjust.tune)
+
+    def value_now(self, name: str, **_: object) -> Fields:
+        """Return the value of a variable; nothing for an empty name."""
+        return {"now": self.get([name])[0][1]} if name.strip() else {}
 
     def unforce(self, names: Sequence[str]) -> None:
         """End forces, all of them without names."""
@@ -116,33 +171,29 @@ class OperatorRequests:
             self._short("unforce", name, MAX_NAME)
         self._rack.adjust.unforce(list(names) or None)
 
-    def tune(self, name: str, value: str) -> None:
-        """Set a tunable, ``TASK.NAME``."""
-        self._named("tune", name)
-        kind = type_of_name("".join(name.split()).upper())
-        held = self._value("tune", name, value, kind, 0)
-        self._rack.adjust.tune(name, 0 if isinstance(held, str) else held)
+    def forces_now(self, **_: object) -> Fields:
+        """Return what is forced."""
+        return {"forced": [name for name, _ in self.forces()]}
 
-    def module(self, slot: str, control: str, value: str) -> None:
+    def module(self, name: str, control: str, value: str) -> None:
         """Move a control of the module in a slot: ``7``, ``test_switch``, ``A``."""
-        for text in (slot, control, value):
+        for text in (name, control, value):
             self._short("module", text, MAX_NAME)
-        SwitchOperations(self._rack).module(slot.strip(), control.strip(), value.strip())
+        SwitchOperations(self._rack).module(name.strip(), control.strip(), value.strip())
 
-    def plant(self, name: str, verb: str, value: str) -> None:
+    def plant(self, name: str, control: str, value: str) -> None:
         """Break, mend or load a plant: ``UNWIND``, ``short_scr``, ``3``."""
-        for text in (name, verb, value):
+        for text in (name, control, value):
             self._short("plant", text, MAX_NAME)
-        SwitchOperations(self._rack).plant(name.strip().upper(), verb.strip(), value.strip())
+        SwitchOperations(self._rack).plant(name.strip().upper(), control.strip(), value.strip())
 
-    def reload(self, task: str, source: str, *, keep_state: bool = False) -> list[str]:
-        """Replace a task's source by a text; return the warnings of its check.
+    def reload(self, task: str, source: str, *, keep_state: bool = False) -> Fields:
+        """Replace a task's source by a text; ``admit_reload``, ``prepare`` and ``install`` are its parts.
 
         Raises:
             ReloadRefused: the source has errors; the old one continues.
         """
-        self.install(self.prepare(*self.admit_reload(task, source)), keep_state=keep_state)
-        return []
+        return {"lost": self.install(self.prepare(*self.admit_reload(task, source)), keep_state=keep_state)}
 
     def admit_reload(self, task: str, source: str) -> tuple[str, SourceText]:
         """Return the task of a reload and its new source: first part of a reload, short.
@@ -151,7 +202,8 @@ class OperatorRequests:
         """
         name = self._task("reload", task)
         if len(source) > MAX_BYTES:
-            self._refuse("reload", f"a source of {len(source)} characters: at most {MAX_BYTES} are read", name)
+            reason = f"a source of {len(source)} characters: at most {MAX_BYTES} are read"
+            self._reports.refuse("reload", reason, name)
         self._rack.operations.admit_reload(name)
         return name, SourceText(f"{name}{Path(self._rack.sources[name].name).suffix}", source)
 
@@ -171,33 +223,24 @@ class OperatorRequests:
         Raises:
             ReloadRefused: the source has errors; the old one continues.
         """
-        tuned = self._tuned(prepared.task)
+        before = self._tunables(prepared.task)
         try:
             self._rack.operations.install(prepared, keep_state=keep_state)
         except RackError as error:
             found = [render(item, where) for where, items in error.findings for item in items]
             raise ReloadRefused(str(error), found[:_MOST_FINDINGS]) from error
-        return self._lost(prepared.task, tuned)
-
-    def _tuned(self, name: str) -> dict[str, Value]:
-        """Return the tunables of a task that differ from its source, with their values."""
-        task = self._rack.task(name)
-        values = {item.name: (task.value(item.name), item.initial) for item in task.layout.fields if _is_tunable(item)}
-        return {key: held for key, (held, initial) in values.items() if held != initial and not isinstance(held, list)}
-
-    def _lost(self, name: str, tuned: Mapping[str, Value]) -> str:
-        task = self._rack.task(name)
-        now = {item.name: task.value(item.name) for item in task.layout.fields if _is_tunable(item)}
-        lost = [
-            f"{key} was tuned to {source_text(held)} and is {_source_value(now.get(key))}"
-            for key, held in tuned.items()
-            if now.get(key) != held
-        ]
-        return ", ".join(lost)
+        now = self._tunables(prepared.task)
+        lost = {name: held for name, (held, initial) in before.items() if held != initial}
+        return ", ".join(
+            f"{name} was tuned to {source_text(held)} and is "
+            + (f"{source_text(now[name][0])} again" if name in now else "not there any more")
+            for name, held in lost.items()
+            if name not in now or now[name][0] != held
+        )
 
     def refuse_reload(self, task: str, reason: str) -> NoReturn:
         """Refuse a reload for a reason of the caller's."""
-        self._refuse("reload", reason, self._task("reload", task))
+        self._reports.refuse("reload", reason, self._task("reload", task))
 
     def get(self, names: Sequence[str]) -> list[tuple[str, str]]:
         """Return commons, their elements, and variables of tasks (``TASK.NAME``): each name with its value's text."""
@@ -215,162 +258,188 @@ class OperatorRequests:
         """Return a task, or all of the rack without a name."""
         return self._readings.tasks_named(task)
 
-    def task_word(self, task: str) -> str:
-        """Return a task's name in the form for a look-up, "" if none is given."""
-        return self._task("step", task)
+    def errors(self, task: str) -> Fields:
+        """Return the error logs of a task, or of all without a name."""
+        found = [
+            {
+                "task": name,
+                "place": place,
+                "line": entry.line,
+                "code": entry.problem,
+                "text": problem.title if (problem := PROBLEMS.get(entry.problem)) else "unknown problem",
+                "scan": entry.scan,
+            }
+            for name in self.tasks_named(task)
+            for place, entry in zip(PLACES, self._rack.task(name).errors.entries, strict=False)
+        ]
+        return {"errors": found}
 
-    def _common_value(self, what: str, name: str, text: str) -> Value:
-        """Return the value that a text writes for a variable; an unknown name is left for the rack to refuse."""
-        self._named(what, name)
-        if "." in name:
-            return self._value(what, name, text, type_of_name("".join(name.split()).upper()), 0)
-        try:
-            variable = common_named(self._rack.config, name).variable
-        except NameFault:
-            return 0
-        return self._value(what, name, text, variable.type, variable.length)
+    def status(self, **_: object) -> Fields:
+        """Return the state of the rack, of its drives and of its Processors' displays."""
+        rack, operations = self._rack, self._rack.operations
+        fields = {
+            "rack": rack.config.name,
+            "time_s": self._now_s,
+            "powered": operations.powered,
+            "halted": self._halting.halted,
+            "stopped": operations.stopped is not None,
+            "tasks": len(rack.tasks),
+            "running": self._running,
+            "ended": sum(task.is_done for task in rack.tasks),
+            "forced": len(rack.forces()),
+            "drive_faults": self._trips.lines(),
+        }
+        if (cause := operations.stopped) is not None:
+            fields |= {
+                "stopped_at_s": cause.time_ns / NS_PER_S,
+                "stopped_code": cause.code or "",
+                "stopped_task": cause.task,
+                "stopped_reason": cause.reason,
+            }
+        displays = displays_of(rack)
+        fields["display_modules"] = [item.module for item in displays]
+        fields["display_codes"] = [item.code for item in displays]
+        fields["display_meanings"] = [item.meaning for item in displays]
+        return fields
 
-    def _value(self, what: str, name: str, text: str, kind: DataType, length: int) -> Value:
+    @property
+    def _now_s(self) -> float:
+        return self._rack.now_ns / NS_PER_S
+
+    @property
+    def _running(self) -> int:
+        return sum(task.status is Status.RUNNING for task in self._rack.tasks)
+
+    def _tunables(self, name: str) -> dict[str, tuple[Value, Value]]:
+        """Return the tunables of a task with their values, and those of its source."""
+        task = self._rack.task(name)
+        names = [item.name for item in task.layout.fields if item.role is Role.TUNABLE]
+        initial = {item.name: item.initial for item in task.layout.fields}
+        return {name: (value, initial[name]) for name in names if not isinstance(value := task.value(name), list)}
+
+    def _give(self, what: str, name: str, text: str, act: Callable[[Target, Any], None]) -> Fields:
+        """Give a variable the value that a text means; return the texts of its values before and now."""
+        self._short(what, name, MAX_NAME)
+        if not name.strip():
+            wants = "TASK.NAME" if what == "tune" else "a common, an element, or TASK.NAME to force"
+            self._reports.refuse(what, f"the name is empty: it takes {wants}")
+        target = self._rack.adjust.find(what, name)
+        kind, length = target.variable.type, target.variable.length
         self._short(what, text, MAX_VALUE)
         value = value_of(text if kind is DataType.STRING else text.strip(), kind, length)
         if value is None:
             reason = f"{quoted(text)} is not a value for {printable(name)}: it takes {wanted(kind, length)}"
-            self._refuse(what, reason)
-        return value
+            self._reports.refuse(what, reason)
+        before = self._text(target)
+        act(target, value)
+        return {"before": before, "now": self._text(target)}
 
-    def _named(self, what: str, name: str) -> None:
-        self._short(what, name, MAX_NAME)
-        if not name.strip():
-            wants = "TASK.NAME" if what == "tune" else "a common, an element, or TASK.NAME to force"
-            self._refuse(what, f"the name is empty: it takes {wants}")
+    def _text(self, target: Target) -> str:
+        if isinstance(target, LocalElement):
+            return source_text(target.value)
+        return source_text(self._rack.value(target.name, target.index))
 
     def _task(self, what: str, name: str) -> str:
-        self._short(what, name, MAX_NAME)
-        return name.strip().upper()
+        return self._short(what, name, MAX_NAME).strip().upper()
 
     def _few(self, what: str, names: Sequence[str]) -> Sequence[str]:
         if len(names) > MAX_NAMES:
-            self._refuse(what, f"{len(names)} names: at most {MAX_NAMES} are taken at once")
+            self._reports.refuse(what, f"{len(names)} names: at most {MAX_NAMES} are taken at once")
         return names
 
     def _short(self, what: str, text: str, most: int) -> str:
         if len(text) > most:
-            self._refuse(what, f"a text of {len(text)} characters: at most {most} are read")
+            self._reports.refuse(what, f"a text of {len(text)} characters: at most {most} are read")
         return text
 
-    def _refuse(self, what: str, reason: str, task: str = "") -> NoReturn:
-        self._rack.observers.operated(Operation(self._rack.now_ns, what, task, ok=False, reason=reason))
-        raise OperationRefused(reason)
+
+def _readings(found: Sequence[Reading]) -> Fields:
+    return {
+        "found": [item.name for item in found],
+        "values": [item.value for item in found],
+        "shown": [item.shown for item in found],
+    }
 
 
-def _is_tunable(field: StateField) -> bool:
-    return field.role is Role.TUNABLE
+class Concerns(Enum):
+    """The processes of a distributed rack that a request concerns, by its fields."""
+
+    COMMON_MEMORY = auto()
+    """The one with common memory."""
+    ALL = auto()
+    TASK = auto()
+    """That of ``task``; all for an empty name."""
+    NAME = auto()
+    """That of ``name``, a common or ``TASK.NAME``."""
+    NAMES = auto()
+    """Those of ``names``; all without names."""
+    SLOT = auto()
+    """That of the module in the slot ``name``."""
+    PLANT = auto()
+    """That of the plant ``name``."""
+    STATUS = auto()
+    """All, or the one with common memory if the request is ``home_only``."""
+    NONE = auto()
+    """A distributed rack refuses it: its processes share the wall clock."""
 
 
-def _source_value(value: Value | list[Value] | None) -> str:
-    return f"{source_text(value)} again" if value is not None and not isinstance(value, list) else "not there any more"
+def _nothing(_: OperatorRequests, **__: object) -> Fields:
+    return {}
 
 
 @dataclass(frozen=True)
-class Reading:
-    """A value that was read; ``shown`` is it in its unit, such as ``7.5 bar``, "" without one."""
+class Verb:
+    """A request that an operator may send, a service of the rack.
 
-    name: str
-    value: str
-    shown: str = ""
-
-
-class Readings:
-    """Reads values of one rack.
-
-    Raises:
-        OperationRefused: all methods, if a name means nothing. Observers are not notified: a question is not an
-            operation.
+    ``type_name`` is the service's type, ``package/Type``. ``act`` gets the fields of the request and returns fields of
+    the answer; ``now`` returns what is true afterwards, of a refused request too.
     """
 
-    def __init__(self, rack: Rack) -> None:
-        self._rack = rack
-
-    def get(self, names: Sequence[str]) -> list[Reading]:
-        """Return commons, their elements, and variables of tasks (``TASK.NAME``), each once.
-
-        A name may be a pattern: ``*`` stands for any characters, ``?`` for one. ``F_*`` means simple commons,
-        ``TABLE%(*)`` elements, ``SPEED.*`` a task's own variables (decision).
-        """
-        found: dict[str, Reading] = {}
-        for name in names:
-            if len(name) > MAX_NAME:
-                raise OperationRefused(f"a name of {len(name)} characters: the longest has {MAX_NAME}")
-            found |= {item.name: item for item in self._meant("".join(name.split()).upper(), name)}
-            if len(found) > MAX_NAMES:
-                raise OperationRefused(f"the names mean {len(found)} values: at most {MAX_NAMES} are read at once")
-        return list(found.values())
-
-    def tasks_named(self, task: str) -> list[str]:
-        """Return a task, or all of the rack without a name."""
-        return [self._known(task)] if task.strip() else [item.name for item in self._rack.tasks]
-
-    def _meant(self, plain: str, asked: str) -> Iterable[Reading]:
-        owner, dot, local = plain.partition(".")
-        is_pattern = any(char in plain for char in _WILD)
-        if dot:
-            task = self._known(owner)
-            own = self._matching(local, self._locals(task), f"task {task} has no") if is_pattern else [local]
-            return [Reading(f"{task}.{name}", self._local(task, name)) for name in own]
-        if not is_pattern:
-            return [self._common(asked)]
-        places = [
-            (variable, index)
-            for variable in self._rack.config.variables
-            if variable.bank is None and variable.is_array == ("(" in plain)
-            for index in range(variable.elements)
-        ]
-        named = {element_name(variable, index): (variable, index) for variable, index in places}
-        wanted = self._matching(plain, named, "the rack has no common")
-        return [self._read(name, *named[name]) for name in wanted]
-
-    def _matching(self, pattern: str, names: Iterable[str], absent: str) -> list[str]:
-        known = list(names)
-        # fnmatch's own form: it does not backtrack, however many stars a stranger writes.
-        matches = re.compile(translate(pattern.replace("[", "[[]"))).match
-        found = [name for name in known if matches(name)]
-        if not found:
-            near = near_or_listed("".join(char for char in pattern if char not in _WILD), known)
-            raise OperationRefused(f"{absent} variable like {quoted(pattern)}" + (f": {near}" if near else ""))
-        return found
-
-    def _common(self, name: str) -> Reading:
-        try:
-            found = common_named(self._rack.config, name)
-        except NameFault as fault:
-            raise OperationRefused(f"{fault.message}: {fault.hint}" if fault.hint else fault.message) from fault
-        return self._read(found.label, found.variable, found.index)
-
-    def _read(self, label: str, variable: CommonVariable, index: int) -> Reading:
-        value = self._rack.value(variable.name, index)
-        return Reading(label, source_text(value), shown_value(variable, value))
-
-    def _local(self, task: str, name: str) -> str:
-        try:
-            value = self._rack.task(task).value(name)
-        except KeyError as error:
-            raise OperationRefused(f"task {task} has no variable {quoted(name)} of its own") from error
-        return ", ".join(map(source_text, value)) if isinstance(value, list) else source_text(value)
-
-    def _locals(self, task: str) -> list[str]:
-        fields = self._rack.task(task).layout.fields
-        return [field.name for field in fields if field.role in (Role.LOCAL, Role.TUNABLE)]
-
-    def _known(self, name: str) -> str:
-        plain = name.strip().upper()
-        if plain not in {item.name for item in self._rack.tasks}:
-            known = sorted(task.name for _, task in self._rack.config.placed_tasks)
-            raise OperationRefused(f"the rack has no task {quoted(name)}: it has {', '.join(known)}")
-        return plain
+    type_name: str
+    concerns: Concerns
+    act: Callable[..., Fields | None]
+    now: Callable[..., Fields] = _nothing
 
 
-def shown_value(variable: CommonVariable, value: Value) -> str:
-    """Return a value in its unit, by its scale if it has one; "" if it has neither."""
-    if variable.scale is not None and not isinstance(value, str):
-        return f"{variable.scale.value_of(int(value)):.6g} {variable.unit}".rstrip()
-    return f"{source_text(value)} {variable.unit}" if variable.unit else ""
+def _on_task(act: Callable[..., None]) -> Verb:
+    return Verb("automax_msgs/OperateTask", Concerns.TASK, act, OperatorRequests.task_now)
+
+
+def _on_value(concerns: Concerns, act: Callable[..., Fields]) -> Verb:
+    return Verb("automax_msgs/SetValue", concerns, act, OperatorRequests.value_now)
+
+
+def _on_rack(concerns: Concerns, act: Callable[..., None], now: Callable[..., Fields]) -> Verb:
+    return Verb("std_srvs/Trigger", concerns, act, now)
+
+
+VERBS: Mapping[str, Verb] = {
+    "run": _on_task(OperatorRequests.run),
+    "stop": _on_task(OperatorRequests.stop),
+    "delete": _on_task(OperatorRequests.delete),
+    "clear": _on_task(OperatorRequests.clear_errors),
+    "clear_errors": _on_task(OperatorRequests.clear_errors),
+    "run_all": _on_rack(Concerns.ALL, OperatorRequests.run_all, OperatorRequests.running_now),
+    "stop_all": _on_rack(Concerns.COMMON_MEMORY, OperatorRequests.stop_all, OperatorRequests.running_now),
+    "pause": _on_rack(Concerns.NONE, OperatorRequests.pause, OperatorRequests.time_now),
+    "resume": _on_rack(Concerns.NONE, OperatorRequests.resume, OperatorRequests.time_now),
+    "step": Verb("automax_msgs/Step", Concerns.NONE, OperatorRequests.step, OperatorRequests.step_now),
+    "power": Verb("automax_msgs/Power", Concerns.ALL, OperatorRequests.power, OperatorRequests.power_now),
+    "set": _on_value(Concerns.COMMON_MEMORY, OperatorRequests.set),
+    "force": _on_value(Concerns.NAME, OperatorRequests.force),
+    "tune": _on_value(Concerns.NAME, OperatorRequests.tune),
+    "unforce": Verb("automax_msgs/Unforce", Concerns.NAMES, OperatorRequests.unforce, OperatorRequests.forces_now),
+    "module": Verb("automax_msgs/OperateControl", Concerns.SLOT, OperatorRequests.module),
+    "plant": Verb("automax_msgs/OperateControl", Concerns.PLANT, OperatorRequests.plant),
+    "reload": Verb("automax_msgs/Reload", Concerns.TASK, OperatorRequests.reload, OperatorRequests.task_now),
+    "get": Verb("automax_msgs/ReadValues", Concerns.NAMES, lambda requests, names: _readings(requests.read(names))),
+    "forces": Verb(
+        "automax_msgs/ReadValues",
+        Concerns.ALL,
+        lambda requests, **_: _readings([Reading(name, text) for name, text in requests.forces()]),
+    ),
+    "errors": Verb("automax_msgs/ReadErrors", Concerns.TASK, OperatorRequests.errors),
+    "tasks": Verb("automax_msgs/ReadTasks", Concerns.ALL, _nothing),
+    "status": Verb("automax_msgs/ReadStatus", Concerns.STATUS, OperatorRequests.status),
+}
+"""All requests by the names of their services; the node adds to ``tasks`` and ``status`` what only the graph knows."""

@@ -15,6 +15,7 @@ from rclpy.clock import Clock, ClockType
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.text import quoted
+from automax_ros.rack.operator.requests import VERBS, Concerns
 from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.distributed.bus import DistributedMemory
@@ -36,7 +37,6 @@ Local = Callable[[Any, Any], Any]
 
 _ADDED = ("tasks", "running", "ended")
 """Fields of a status that count for one process and are added up."""
-_NOT_TOGETHER = ("pause", "resume", "step")
 
 
 def operate_name(module: str, service: str) -> str:
@@ -73,16 +73,17 @@ class RequestForwarder:
 
     def answer(self, service: str, kind: Any, request: Any, response: Any, local: Local) -> Any:
         """Answer a request: at once if it concerns this process alone, else when all processes have answered."""
-        if service in _NOT_TOGETHER:
-            return _refused(response, NOT_TOGETHER)
-        shares = _SHARING[service](self, request, kind)
+        concerns = VERBS[service].concerns
+        if concerns is Concerns.NONE:
+            return conclude(response, ok=False, reason=NOT_TOGETHER)
+        shares = self._targets(concerns, request, kind)
         if [share.seat for share in shares] == [THIS_PROCESS]:
             return local(shares[0].request, response)
         absent = [
             self._name(share.seat) for share in shares if share.seat not in (THIS_PROCESS, *self._bus.peers.by_seat)
         ]
         if absent and len(shares) == 1:
-            return _refused(response, f"{absent[0]} is not there: start its process again")
+            return conclude(response, ok=False, reason=f"{absent[0]} is not there: start its process again")
         answers: dict[int, Any] = {share.seat: None for share in shares}
         for share in shares:
             if share.seat == THIS_PROCESS:
@@ -124,26 +125,38 @@ class RequestForwarder:
         """Return whether a process is present."""
         return seat in self._bus.peers.by_seat
 
-    def seat_of_task(self, text: str) -> int:
-        """Return the process that runs a task; for an unknown name this one, which refuses it."""
+    def _targets(self, concerns: Concerns, request: Any, kind: Any) -> list[Target]:
+        """Return a request to each process that it concerns; this one refuses unknown names."""
+        if concerns is Concerns.NAMES and request.names:
+            groups: dict[int, list[str]] = {}
+            for name in request.names:
+                groups.setdefault(self._seat_of_name(name), []).append(name)
+            return [Target(seat, kind.Request(names=names)) for seat, names in groups.items()]
+        if (
+            concerns in (Concerns.ALL, Concerns.NAMES)
+            or (concerns is Concerns.TASK and not request.task.strip())
+            or (concerns is Concerns.STATUS and not request.home_only)
+        ):
+            return [Target(THIS_PROCESS, request), *(Target(seat, request) for seat in self._seats)]
+        if concerns is Concerns.TASK:
+            seat = self._seat_of_task(request.task)
+        elif concerns is Concerns.NAME:
+            seat = self._seat_of_name(request.name)
+        elif concerns is Concerns.SLOT:
+            seat = self._slots.get(request.name.strip(), THIS_PROCESS)
+        elif concerns is Concerns.PLANT:
+            seat = self._slots.get(str(self._plants.get(request.name.strip().upper(), "")), THIS_PROCESS)
+        else:
+            seat = THIS_PROCESS
+        return [Target(seat, request)]
+
+    def _seat_of_task(self, text: str) -> int:
         return self._tasks.get(text.strip().upper(), THIS_PROCESS)
 
-    def seat_of_name(self, text: str) -> int:
+    def _seat_of_name(self, text: str) -> int:
         """Return the process that holds ``TASK.NAME``, this one for common variables."""
         task, point, _ = text.partition(".")
-        return self.seat_of_task(task) if point else THIS_PROCESS
-
-    def seat_of_slot(self, text: str) -> int:
-        """Return the process that has the module in a slot."""
-        return self._slots.get(text.strip(), THIS_PROCESS)
-
-    def seat_of_plant(self, text: str) -> int:
-        """Return the process that has a plant."""
-        return self._slots.get(str(self._plants.get(text.strip().upper(), "")), THIS_PROCESS)
-
-    def everybody(self, request: Any) -> list[Target]:
-        """Return the targets of a request to all processes."""
-        return [Target(THIS_PROCESS, request), *(Target(seat, request) for seat in self._seats)]
+        return self._seat_of_task(task) if point else THIS_PROCESS
 
     def _name(self, seat: int) -> str:
         return part_name(self._config, self._bus.seats[seat]) if seat in self._bus.seats else quoted(str(seat))
@@ -237,7 +250,7 @@ def _merged(
     if can_name:
         response.absent = list(silent)
     ok = (can_name or not silent) and all(map(_is_ok, found))
-    return _concluded(response, ok=ok, reason="; ".join(dict.fromkeys(reasons)))
+    return conclude(response, ok=ok, reason="; ".join(dict.fromkeys(reasons)))
 
 
 def _in_order(response: Any, names: list[str]) -> None:
@@ -257,78 +270,9 @@ def _reason_of(answer: Any) -> str:
     return str(getattr(answer, "reason", getattr(answer, "message", "")))
 
 
-def _refused(response: Any, reason: str) -> Any:
-    return _concluded(response, ok=False, reason=reason)
-
-
-def _concluded(response: Any, *, ok: bool, reason: str) -> Any:
+def conclude(response: Any, *, ok: bool, reason: str) -> Any:
+    """Fill in the outcome of a request; a message of a success stays. Return the response."""
     for name, value in (("ok", ok), ("success", ok), ("reason", reason), ("message", reason)):
         if hasattr(response, name) and (name != "message" or reason):
             setattr(response, name, value)
     return response
-
-
-def _mine(_: RequestForwarder, request: Any, __: Any) -> list[Target]:
-    return [Target(THIS_PROCESS, request)]
-
-
-def _by_task(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
-    """Return the process of a task; an empty name means all tasks."""
-    if not request.task.strip():
-        return forwarding.everybody(request)
-    return [Target(forwarding.seat_of_task(request.task), request)]
-
-
-def _by_name(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
-    return [Target(forwarding.seat_of_name(request.name), request)]
-
-
-def _by_names(forwarding: RequestForwarder, request: Any, kind: Any) -> list[Target]:
-    """Return the processes of names; without names all processes are meant."""
-    if not request.names:
-        return forwarding.everybody(request)
-    groups: dict[int, list[str]] = {}
-    for name in request.names:
-        groups.setdefault(forwarding.seat_of_name(name), []).append(name)
-    return [Target(seat, kind.Request(names=names)) for seat, names in groups.items()]
-
-
-def _by_slot(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
-    return [Target(forwarding.seat_of_slot(request.name), request)]
-
-
-def _by_plant(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
-    return [Target(forwarding.seat_of_plant(request.name), request)]
-
-
-def _everybody(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
-    return forwarding.everybody(request)
-
-
-def _status(forwarding: RequestForwarder, request: Any, _: Any) -> list[Target]:
-    return [Target(THIS_PROCESS, request)] if request.home_only else forwarding.everybody(request)
-
-
-_SHARING: dict[str, Callable[[RequestForwarder, Any, Any], list[Target]]] = {
-    "run": _by_task,
-    "stop": _by_task,
-    "delete": _by_task,
-    "reload": _by_task,
-    "clear": _by_task,
-    "clear_errors": _by_task,
-    "errors": _by_task,
-    "run_all": _everybody,
-    "power": _everybody,
-    "stop_all": _mine,
-    "set": _mine,
-    "force": _by_name,
-    "tune": _by_name,
-    "unforce": _by_names,
-    "get": _by_names,
-    "forces": _everybody,
-    "module": _by_slot,
-    "plant": _by_plant,
-    "tasks": _everybody,
-    "status": _status,
-}
-"""Returns the processes that a request concerns, by service; ``_mine``: it concerns common memory alone."""

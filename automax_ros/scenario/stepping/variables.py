@@ -65,7 +65,7 @@ class Variables:
 
     def _of_task(self, name: str) -> Variable:
         meant = local_named(self.rack.tasks, name)
-        kind = meant.symbol
+        kind = meant.variable
         read = partial(self._local, meant.task, kind.name, meant.element.index)
         return Variable(meant.label, kind.type, kind.length, meant.task.name, read)
 

@@ -75,7 +75,7 @@ class RackSignals:
             variable.length,
             *variable.type.range,
             partial(self.rack.memory.read_now, view, meant.index),
-            partial(self.rack.adjust.write, meant.label),
+            partial(self.rack.adjust.write, meant),
             partial(self._write, meant, view),
         )
 
@@ -88,14 +88,9 @@ class RackSignals:
 
 def local_signal(rack: Rack, meant: LocalElement) -> Signal:
     """Return a simple local of a task, which can be set only by a force."""
-    kind = meant.symbol.type
-    force = partial(rack.adjust.force, meant.label)
-    return Signal(meant.label, kind, 0, *kind.range, partial(_present, meant), force, force)
-
-
-def _present(meant: LocalElement) -> Value:
-    value = meant.task.value(meant.symbol.name)
-    return value[meant.element.index] if isinstance(value, list) else value
+    kind = meant.variable.type
+    force = partial(rack.adjust.force, meant)
+    return Signal(meant.label, kind, 0, *kind.range, lambda: meant.value, force, force)
 
 
 @dataclass(frozen=True)
