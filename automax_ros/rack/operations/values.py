@@ -124,7 +124,7 @@ class ValueOperations:
         """
         self._write(_NOT_REPORTED, variable, value)
 
-    def tune(self, variable: str | Target, value: float) -> None:
+    def tune(self, variable: str | Target, value: Value) -> None:
         """Set a tunable, ``TASK.NAME``, to any value within its limits (decision: STEP binds only ``tune_step``).
 
         Raises:
@@ -160,7 +160,7 @@ class ValueOperations:
         self._carry_out(what, lambda: write(view, value, OPERATOR_WRITER, found.index))
         return found.label
 
-    def _change(self, meant: Target, value: float) -> None:
+    def _change(self, meant: Target, value: Value) -> None:
         assert isinstance(meant, LocalElement)
         try:
             self._tune(meant.task, meant.variable.name, value)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as AbstractMapping
-from dataclasses import dataclass
 from functools import partial
 
 from automax_ros.core.text import near_or_listed, quoted
@@ -13,8 +12,8 @@ from automax_ros.drive.plant.faults import VERBS, PlantVerb, values_of
 from automax_ros.rack.modules.module import Operable
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.reading.values import Entry, ProblemList, Section, entries_of, integer_value, kind_of
-from automax_ros.scenario.stimuli.actions import Control
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, integer_value, kind_of
+from automax_ros.scenario.stimuli.actions import Operate
 from automax_ros.scenario.stimuli.reading import Verb, named
 from automax_ros.scenario.stimuli.wave_player import Action
 
@@ -38,7 +37,7 @@ def read_plant_work(rack: Rack, node: Node, what: str, findings: ProblemList) ->
         for verb, value in entries or ():
             text = _text(verb, value, where, findings)
             if text is not None:
-                found.append(Control(name, verb.text, text, controls.plant))
+                found.append(Operate(name, partial(controls.plant, name, verb.text, text)))
     return found
 
 
@@ -105,41 +104,28 @@ def _module(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Ac
             findings.add("AMX6742", f"the rack has no module in slot {slot}", key.span)
             continue
         known = module.controls if isinstance(module, Operable) else {}
-        moved = _controls(item, f"the {module.config.model} in slot {slot}", known, findings)
-        found += [Control(str(slot), control.verb, control.value, controls.module) for control in moved]
+        where = f"the {module.config.model} in slot {slot}"
+        entries = entries_of(item, where, findings)
+        if entries == ():
+            findings.add("AMX6008", f"{where}: no control is named", item.span)
+        for control, position in entries or ():
+            if _is_position(control, position, where, known, findings):
+                move = partial(controls.module, str(slot), control.text, _plain(position))
+                found.append(Operate(str(slot), move))
     return found
 
 
-@dataclass(frozen=True)
-class _Given:
-    """A control in the file with its new position."""
-
-    key: Scalar
-    verb: str
-    value: str
-
-
-def _controls(
-    node: Node, what: str, known: AbstractMapping[str, tuple[str, ...]], findings: ProblemList
-) -> list[_Given]:
-    entries = entries_of(node, what, findings)
-    if entries == ():
-        findings.add("AMX6008", f"{what}: no control is named", node.span)
-    found = (_control(entry, what, known, findings) for entry in entries or ())
-    return [item for item in found if item is not None]
-
-
-def _control(
-    entry: Entry, what: str, known: AbstractMapping[str, tuple[str, ...]], findings: ProblemList
-) -> _Given | None:
-    key, node = entry
+def _is_position(
+    key: Scalar, node: Node, where: str, known: AbstractMapping[str, tuple[str, ...]], findings: ProblemList
+) -> bool:
+    """Return whether a control of a module has the position in a file; report it if not."""
     if key.text not in known:
-        message = f"{what} has no control {quoted(key.text)}"
+        message = f"{where} has no control {quoted(key.text)}"
         findings.add("AMX6742", message, key.span, near_or_listed(key.text, known))
-        return None
+        return False
     positions = known[key.text]
     if not isinstance(node, Scalar) or node.is_null or (positions and node.text not in positions):
         takes = ", ".join(positions) if positions else "a number"
-        findings.add("AMX6736", f"{key.text} of {what} cannot be {kind_of(node)}: it takes {takes}", node.span)
-        return None
-    return _Given(key, key.text, node.text)
+        findings.add("AMX6736", f"{key.text} of {where} cannot be {kind_of(node)}: it takes {takes}", node.span)
+        return False
+    return True

@@ -8,13 +8,14 @@ from functools import partial
 from pathlib import Path
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.names import PREDEFINED, NameFault, element
+from automax_ros.core.names import PREDEFINED, Element, NameFault, element
 from automax_ros.core.text import did_you_mean, near_or_listed, quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_of, wanted
 from automax_ros.core.yaml_text import Mapping as Keys
 from automax_ros.core.yaml_text import Node, Scalar, Sequence
-from automax_ros.rack.base.local_names import local_named
+from automax_ros.rack.base.local_names import LocalElement, local_named
+from automax_ros.rack.operations.forces import Target
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.rackfile.model.value_names import common_named
@@ -30,10 +31,10 @@ from automax_ros.rackfile.reading.values import (
     wrong_kind,
 )
 from automax_ros.runtime.tasks.task import Task
-from automax_ros.scenario.stimuli.actions import OnRack, OnTask, OnValue, Reload
+from automax_ros.scenario.stimuli.actions import Operate, Reload
 from automax_ros.scenario.stimuli.plant_verbs import control_verbs
 from automax_ros.scenario.stimuli.reading import Read, Verb, cut_short, named, time_of, value_for
-from automax_ros.scenario.stimuli.signals import RackSignals, Signal, local_signal
+from automax_ros.scenario.stimuli.signals import RackSignals
 from automax_ros.scenario.stimuli.values import value_verbs
 from automax_ros.scenario.stimuli.wave_player import Action
 
@@ -69,7 +70,7 @@ def _switch(operation: Callable[[], None]) -> Read:
     def read(node: Node, what: str, findings: ProblemList) -> list[Action]:
         if boolean_value(node, what, findings) is False:
             findings.add("AMX6736", f"{what} must be true: leave the entry out if it must not happen", node.span)
-        return [OnRack(operation)]
+        return [Operate("", operation)]
 
     return read
 
@@ -104,9 +105,9 @@ class _Tasks:
 
         def read(node: Node, what: str, findings: ProblemList) -> list[Action]:
             if every is not None and isinstance(node, Scalar) and node.text == ALL:
-                return [OnRack(every)]
+                return [Operate("", every)]
             tasks = [self.task(name, findings) for name in names_of(node, what, findings)]
-            return [OnTask(task.name, operation) for task in tasks if task is not None]
+            return [Operate(task.name, partial(operation, task.name)) for task in tasks if task is not None]
 
         return read
 
@@ -115,7 +116,7 @@ class _Tasks:
         found = (self._tuned(key, value, findings) for key, value in named(node, what, findings))
         return [item for item in found if item is not None]
 
-    def _tuned(self, key: Scalar, node: Node, findings: ProblemList) -> OnValue | None:
+    def _tuned(self, key: Scalar, node: Node, findings: ProblemList) -> Operate | None:
         owner, dot, name = key.text.partition(".")
         if not dot:
             hint = "write TASK.NAME, such as SPEED.KP"
@@ -124,7 +125,7 @@ class _Tasks:
         task = self.task(Scalar(owner.strip(), key.plain, key.span), findings)
         return self._of_task(task, name, key, node, findings) if task is not None else None
 
-    def _of_task(self, task: Task, name: str, key: Scalar, node: Node, findings: ProblemList) -> OnValue | None:
+    def _of_task(self, task: Task, name: str, key: Scalar, node: Node, findings: ProblemList) -> Operate | None:
         tunables = {item.name: item for item in task.compiled.program.symbols.values() if item.tuning is not None}
         try:
             symbol = element(name, tunables, f"task {task.name} has no tunable").variable
@@ -141,18 +142,16 @@ class _Tasks:
         except ValueError as error:
             findings.add("AMX6741", f"task {task.name}: {error}", node.span)
             return None
-        return OnValue(f"{task.name}.{symbol.name}", value, self.rack.adjust.tune)
+        target = LocalElement(task, Element(symbol))
+        return Operate(target.label, partial(self.rack.adjust.tune, target, value))
 
 
-def _forceable(rack: Rack, key: Scalar, findings: ProblemList) -> Signal | None:
+def _forceable(rack: Rack, key: Scalar, findings: ProblemList) -> Target | None:
     """Return a variable that may be forced: a simple one that is not a STRING."""
-    if "." in key.text:
-        return _local(rack, key, findings)
-    meant = _common(rack, key, findings)
-    return None if meant is None else RackSignals(rack).signal(meant)
+    return _local(rack, key, findings) if "." in key.text else _common(rack, key, findings)
 
 
-def _local(rack: Rack, key: Scalar, findings: ProblemList) -> Signal | None:
+def _local(rack: Rack, key: Scalar, findings: ProblemList) -> LocalElement | None:
     if rack.part.is_elsewhere(key.text.partition(".")[0].strip().upper()):
         return None
     try:
@@ -163,7 +162,7 @@ def _local(rack: Rack, key: Scalar, findings: ProblemList) -> Signal | None:
     if meant.why_not_forced is not None:
         findings.add("AMX6737", f"{meant.label} cannot be forced: {meant.why_not_forced}", key.span)
         return None
-    return local_signal(rack, meant)
+    return meant
 
 
 def _common(rack: Rack, key: Scalar, findings: ProblemList) -> CommonElement | None:
@@ -186,21 +185,17 @@ def _force(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Act
     found: list[Action] = []
     for key, item in named(node, what, findings):
         meant = _forceable(rack, key, findings)
-        value = value_for(item, meant, findings) if meant is not None else None
+        value = value_for(item, meant.label, meant.variable, findings) if meant is not None else None
         if meant is not None and value is not None:
-            found.append(OnValue(meant.label, value, rack.adjust.force))
+            found.append(Operate(meant.label, partial(rack.adjust.force, meant, value)))
     return found
 
 
 def _unforce(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
     if isinstance(node, Scalar) and node.text == ALL:
-        return [OnRack(rack.adjust.unforce)]
+        return [Operate("", rack.adjust.unforce)]
     variables = [_forceable(rack, name, findings) for name in names_of(node, what, findings)]
-    return [OnTask(item.label, partial(_release, rack)) for item in variables if item is not None]
-
-
-def _release(rack: Rack, name: str) -> None:
-    rack.adjust.unforce([name])
+    return [Operate(item.label, partial(rack.adjust.unforce, [item])) for item in variables if item is not None]
 
 
 @dataclass(frozen=True)
@@ -269,4 +264,4 @@ def _power(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Act
     good = boolean_value(battery, f"battery of {what}", findings) if battery is not None else True
     if off_ns is None or good is None:
         return []
-    return [OnRack(partial(rack.operations.power, off_ns, battery=good))]
+    return [Operate("", partial(rack.operations.power, off_ns, battery=good))]

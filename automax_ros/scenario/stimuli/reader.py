@@ -20,19 +20,16 @@ from automax_ros.rackfile.reading.values import ProblemList, kind_of, report_twi
 from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 from automax_ros.scenario.stimuli.rack_verbs import rack_verbs
 from automax_ros.scenario.stimuli.reading import Verb, time_of
+from automax_ros.scenario.stimuli.schema import MOST_ENTRIES, VERB_SCHEMAS
 from automax_ros.scenario.stimuli.signals import LoneSignals
-from automax_ros.scenario.stimuli.values import value_verbs
+from automax_ros.scenario.stimuli.values import VALUE_VERBS, value_verbs
 from automax_ros.scenario.stimuli.wave_player import Stimulus
 
 MOST_BYTES = 2_000_000
-MOST_ENTRIES = 50_000
 _MOST_NODES = 1_000_000
 _START = Span(1, 1, 2)
 _FORM = "write {at: 0.5, set: {REF%: 1500}}: a time in seconds and one verb"
-RACK_ONLY = (
-    "force", "unforce", "tune", "run", "stop", "delete", "reload", "run_all", "stop_all", "clear_errors", "power",
-    "plant", "module",
-)  # fmt: skip
+RACK_ONLY = tuple(name for name in VERB_SCHEMAS if name not in VALUE_VERBS)
 """Verbs that a lone task does not have: it has no operator and no modules."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import exact_ns
@@ -74,20 +75,35 @@ def cut_short(name: str) -> str | None:
     return 'a name with several subscripts needs quotes here: "DIAG%(1,0)"'
 
 
-def value_for(node: Node, signal: Signal, findings: ProblemList) -> Value | None:
-    """Return the value of a node as the signal would hold it; None if a problem was reported."""
-    if signal.type is DataType.STRING:
-        text = text_value(node, signal.label, findings, limit=1000)
+class HasType(Protocol):
+    """A variable's data type, and the most characters of a STRING."""
+
+    @property
+    def type(self) -> DataType: ...  # noqa: D102
+
+    @property
+    def length(self) -> int: ...  # noqa: D102
+
+
+def value_for(node: Node, label: str, kind: HasType, findings: ProblemList) -> Value | None:
+    """Return the value of a node as a variable of this kind holds it; None if a problem was reported."""
+    if kind.type is DataType.STRING:
+        text = text_value(node, label, findings, limit=1000)
         if text is None:
             return None
-        value = value_of(text, signal.type, signal.length)
+        value = value_of(text, kind.type, kind.length)
     else:
-        value = value_of(node.text, signal.type) if is_plain_word(node) else None
+        value = value_of(node.text, kind.type) if is_plain_word(node) else None
     if value is None:
-        message = f"{signal.label} cannot be {kind_of(node)}: it takes {wanted(signal.type, signal.length)}"
+        message = f"{label} cannot be {kind_of(node)}: it takes {wanted(kind.type, kind.length)}"
         findings.add("AMX6736", message, node.span, number_hint(node))
-        return None
-    if not isinstance(value, str) and not signal.low <= value <= signal.high:
+    return value
+
+
+def signal_value(node: Node, signal: Signal, findings: ProblemList) -> Value | None:
+    """Return the value of a node within the limits of a signal; None if a problem was reported."""
+    value = value_for(node, signal.label, signal, findings)
+    if value is not None and not isinstance(value, str) and not signal.low <= value <= signal.high:
         limits = f"{value_text(signal.low)} to {value_text(signal.high)}"
         findings.add("AMX6736", f"{signal.label} cannot be {value_text(value)}: its limits are {limits}", node.span)
         return None

@@ -18,10 +18,10 @@ from automax_ros.core.json_schema import (
 )
 from automax_ros.core.ticks import MOST_SECONDS
 from automax_ros.drive.plant.faults import VERBS, PlantVerb
-from automax_ros.scenario.stimuli.reader import MOST_ENTRIES
 from automax_ros.scenario.stimuli.values import LEAST_HZ
 from automax_ros.scenario.stimuli.waves import MOST_HZ
 
+MOST_ENTRIES = 50_000
 _NAME = r"^\s*[A-Za-z_][^{}]*$"
 _SLOT = r"^(0|[1-9]|1[0-5])$"
 _NAMED = scalar("A name.")

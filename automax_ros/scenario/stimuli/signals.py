@@ -9,7 +9,6 @@ from typing import Protocol
 
 from automax_ros.core.names import PREDEFINED, NameFault
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.base.local_names import LocalElement
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.rackfile.model.value_names import common_named
@@ -63,10 +62,6 @@ class RackSignals:
         meant = common_named(self.rack.config, name)
         if meant.name in PREDEFINED:
             raise NameFault(f"{meant.name} cannot be written: the rack itself writes it", "leave it out")
-        return self.signal(meant)
-
-    def signal(self, meant: CommonElement) -> Signal:
-        """Return a common, or an element of one."""
         variable = meant.variable
         view = self.rack.memory.view(variable.name)
         return Signal(
@@ -84,13 +79,6 @@ class RackSignals:
         if not self.rack.operations.powered and not self.rack.config.is_input(meant.variable):
             return
         self.rack.write_view(view, [(meant.index, value)], OPERATOR_WRITER)
-
-
-def local_signal(rack: Rack, meant: LocalElement) -> Signal:
-    """Return a simple local of a task, which can be set only by a force."""
-    kind = meant.variable.type
-    force = partial(rack.adjust.force, meant)
-    return Signal(meant.label, kind, 0, *kind.range, lambda: meant.value, force, force)
 
 
 @dataclass(frozen=True)

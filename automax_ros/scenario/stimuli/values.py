@@ -12,11 +12,12 @@ from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import value_text
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value
-from automax_ros.scenario.stimuli.reading import Verb, named, signal_of, time_of, value_for
+from automax_ros.scenario.stimuli.reading import Verb, named, signal_of, signal_value, time_of
 from automax_ros.scenario.stimuli.signals import Signal, Signals
 from automax_ros.scenario.stimuli.wave_player import Action, Stimulus, WavePlayer
 from automax_ros.scenario.stimuli.waves import MOST_HZ, Ramp, Sine, Square, Wave
 
+VALUE_VERBS = ("set", "ramp", "sine", "square")
 LEAST_HZ = 0.0001
 """Lowest frequency (decision: slower is a ramp)."""
 
@@ -68,7 +69,7 @@ def value_verbs(signals: Signals) -> Mapping[str, Verb]:
         found: list[Action] = []
         for key, item in named(node, what, findings):
             signal = signal_of(key, signals, findings)
-            value = value_for(item, signal, findings) if signal is not None else None
+            value = signal_value(item, signal, findings) if signal is not None else None
             if signal is not None and value is not None:
                 found.append(SetValue(signal, value))
         return found
@@ -100,7 +101,7 @@ class _Shape:
 
     def level(self, key: str) -> Value | None:
         node = self.section.get(key)
-        return value_for(node, self.signal, self.findings) if node is not None else None
+        return signal_value(node, self.signal, self.findings) if node is not None else None
 
     def refuse(self, code: str, message: str, key: str) -> None:
         self.findings.add(code, f"{self.what}: {message}", self.section.key_span(key))
