@@ -93,9 +93,7 @@ def main() -> None:
     try:
         rclpy.spin(ConveyorFollower())
     except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        rclpy.try_shutdown()
+        pass  # rclpy's own handler shuts ROS down: a second shutdown at the same time would raise an RCLError
 
 
 if __name__ == "__main__":

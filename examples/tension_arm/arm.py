@@ -107,9 +107,7 @@ def main() -> None:
     try:
         rclpy.spin(TensionArm())
     except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        rclpy.try_shutdown()
+        pass  # rclpy's own handler shuts ROS down: a second shutdown at the same time would raise an RCLError
 
 
 if __name__ == "__main__":
