@@ -20,7 +20,7 @@ FORGOTTEN = ("AMX6496", "AMX6497", "AMX6498")
 CODES = [
     code
     for code in PROBLEMS
-    if ("AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710") and code not in TOO_LONG
+    if ("AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710" or code == "AMX6788") and code not in TOO_LONG
 ]
 
 

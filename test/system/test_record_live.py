@@ -143,6 +143,17 @@ def test_replay_of_a_live_recording_finds_no_difference(running, tmp_path):
     assert (replayed.code, replayed.err) == (0, "")
 
 
+def test_a_recording_without_a_scan_is_no_success(ros_domain_id, tmp_path):
+    """The tasks of the rack do not run: nothing of the recording could be replayed."""
+    stop = tmp_path / "stop.yaml"
+    stop.write_text("- {at: 0, stop_all: true}\n")
+    with Automax("run", TYPES, "--stimuli", stop) as process:
+        process.wait_for_line(READY)
+        ended = automax("record", "TYPES", "--output", tmp_path / "bag", "--duration", "0.5")
+    assert (ended.code, ended.err) == (1, "")
+    assert "it holds no scan: nothing of it can be replayed; do the tasks run?" in ended.out
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_stop_before_anything_came_is_clean(ros_domain_id, tmp_path, number):
     with Automax("record", "TYPES", "--output", tmp_path / "bag", "--wait", "100") as recorder:
