@@ -141,11 +141,17 @@ class RackNodes:
         self._pacer = self._clock.pace
         self._intake = MessageIntake(self._report)
         self._site = RackContext(
-            self.rack, self.stream, self._pacer, self._context, self.health, self._intake, arguments, lock=turns
+            self.rack,
+            self.stream,
+            self._pacer,
+            self._context,
+            self.health,
+            self._intake,
+            arguments,
+            lock=turns,
+            is_recorded=seating is not None and seating.awaits_recorder,
         )
         self._begun = self._closed = False
-        recorded = seating is not None and seating.awaits_recorder
-        self._delivery_ns = DELIVERY_TO_RECORDER_NS if recorded else DELIVERY_NS
         self._thread: threading.Thread | None = None
         self.nodes = nodes_of(self._site)
         self._own: tuple[RackNode, ...] = ()
@@ -342,7 +348,7 @@ class RackNodes:
 
     def _deliver(self) -> None:
         """Wait until subscribers have received all: a writer that is destroyed sends nothing again."""
-        deadline_ns = time.monotonic_ns() + self._delivery_ns
+        deadline_ns = time.monotonic_ns() + (DELIVERY_TO_RECORDER_NS if self._site.is_recorded else DELIVERY_NS)
         for publisher in (publisher for node in self.nodes for publisher in node.publishers):
             if not self._context.ok():
                 return

@@ -12,6 +12,7 @@ Publishes:
 Parameters: belt_ratio, loop_m, gain_per_s.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from automax_ros.ros.setup.environment import prepare
@@ -90,10 +91,9 @@ class ConveyorFollower(Node):
 def main() -> None:
     """Follow until Ctrl-C."""
     rclpy.init()
-    try:
+    # Ctrl-C shuts ROS down: a second shutdown at the same time would raise an RCLError.
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
         rclpy.spin(ConveyorFollower())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass  # rclpy's own handler shuts ROS down: a second shutdown at the same time would raise an RCLError
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ Publishes:
 Parameters: joint, tension_n, roll_radius_m, gear_ratio, stiffness_n_per_m, lag_s.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from automax_ros.ros.setup.environment import prepare
@@ -104,10 +105,9 @@ class TensionArm(Node):
 def main() -> None:
     """Hold the web until Ctrl-C, then let it go."""
     rclpy.init()
-    try:
+    # Ctrl-C shuts ROS down: a second shutdown at the same time would raise an RCLError.
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
         rclpy.spin(TensionArm())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass  # rclpy's own handler shuts ROS down: a second shutdown at the same time would raise an RCLError
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -56,7 +57,27 @@ def test_a_recording_has_all_of_the_run(ros_domain_id, tmp_path):
     assert {name: task.missing for name, task in info.tasks.items() if task.missing} == {}
     report = replay(bag)
     assert report.identical
-    assert [note for task in report.tasks for note in task.notes if "missing" in note] == []
+    assert [note for task in report.tasks for note in task.notes if "missing" in note] == [], ended
+
+
+@pytest.mark.timeout(900)
+def test_a_recorder_that_is_held_up_for_seconds_loses_nothing(ros_domain_id, tmp_path):
+    """Each process keeps its messages for it: 1,100 writes come in a second, and most of them find its socket full."""
+    rack, bag = copied(tmp_path), tmp_path / "bag"
+    with Distributed(rack, "--record", bag, "--duration", "6") as run:
+        run.wait_for_line("recording since")
+        recorder = recorder_of(run)
+        os.kill(recorder, signal.SIGSTOP)
+        try:
+            time.sleep(3.0)
+        finally:
+            os.kill(recorder, signal.SIGCONT)
+        ended = run.end()
+    assert ended.code == 0, ended
+    info = bag_info(bag, check=True)
+    assert (info.problems, "gaps" in info.custom_data) == ([], False)
+    assert {name: task.missing for name, task in info.tasks.items() if task.missing} == {}
+    assert replay(bag).identical
 
 
 @pytest.mark.timeout(300)

@@ -8,18 +8,18 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from automax_ros.cli.operate.press import add_press_arguments, press_asks
-from automax_ros.cli.operate.requests import Action, Means, ServiceCall
+from automax_ros.cli.operate.press import add_press_arguments, press_calls
+from automax_ros.cli.operate.requests import Action, Mode, ServiceCall
 from automax_ros.cli.operate.text import (
     error_lines,
     fields_of,
-    message_told,
-    reload_told,
+    message_text,
+    reload_text,
     status_lines,
     step_lines,
     task_lines,
     value_lines,
-    value_told,
+    value_text,
 )
 from automax_ros.cli.operate.watch import NAMES_HELP, add_watch_arguments, values_of
 from automax_ros.cli.options.values import seconds_above_0, whole_number
@@ -43,7 +43,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _asks(given: argparse.Namespace) -> list[ServiceCall]:
+def _lifecycle_calls(given: argparse.Namespace) -> list[ServiceCall]:
     if not given.node.isidentifier() or not given.node.isascii():
         raise UsageError(f"{quoted(given.node)} is not the name of a node", "such as rack, processor_1, udc_10")
     of = f"{given.transition} {given.node}"
@@ -61,7 +61,7 @@ def _reason(_: str) -> str:
 
 LIFECYCLE = Action(
     "configure, activate, deactivate, clean up or shut down the node `rack` or a module's; or read its state",
-    _asks,
+    _lifecycle_calls,
     _add,
     lambda answer: answer.current_state.label if hasattr(answer, "current_state") else "done",
     lambda state: [state],
@@ -110,12 +110,12 @@ def _control(name: str, help_text: str) -> Callable[[argparse.ArgumentParser], N
 
 
 def _moved(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
-    def asks(given: argparse.Namespace) -> list[ServiceCall]:
+    def calls(given: argparse.Namespace) -> list[ServiceCall]:
         value = " ".join(given.value) or "true"
         fields = {"name": given.name, "control": given.control, "value": value}
         return [ServiceCall(service, "automax_msgs/OperateControl", fields, f"{given.name} {given.control} {value}")]
 
-    return asks
+    return calls
 
 
 def _each_task(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
@@ -125,7 +125,7 @@ def _each_task(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]
 
 
 def _each_assignment(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
-    def asks(given: argparse.Namespace) -> list[ServiceCall]:
+    def calls(given: argparse.Namespace) -> list[ServiceCall]:
         found = []
         for text in given.assignments:
             name, equals, value = text.partition("=")
@@ -135,7 +135,7 @@ def _each_assignment(service: str) -> Callable[[argparse.Namespace], list[Servic
             found.append(ServiceCall(service, "automax_msgs/SetValue", fields, f"{name.strip()} = {value}"))
         return found
 
-    return asks
+    return calls
 
 
 def _release(given: argparse.Namespace) -> list[ServiceCall]:
@@ -230,10 +230,10 @@ ACTIONS: Mapping[str, Action] = {
     "run": Action("put tasks into RUN", _each_task("run"), _tasks),
     "stop": Action("stop tasks", _each_task("stop"), _tasks),
     "delete": Action("take stopped tasks out; a reload brings them back", _each_task("delete"), _tasks),
-    "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger"), told=message_told),
-    "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger"), told=message_told),
+    "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger"), done_text=message_text),
+    "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger"), done_text=message_text),
     "power": Action("switch the power off and on", _power, _powered),
-    "pause": Action("halt the rack: rack time stands still", _one("pause", "std_srvs/Trigger"), told=message_told),
+    "pause": Action("halt the rack: rack time stands still", _one("pause", "std_srvs/Trigger"), done_text=message_text),
     "step": Action(
         "let a halted rack go on by scans, ticks, or until a rack time at most 1 s later",
         _step,
@@ -242,9 +242,9 @@ ACTIONS: Mapping[str, Action] = {
         step_lines,
         acts=True,
     ),
-    "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger"), told=message_told),
-    "set": Action("write commons once", _each_assignment("set"), _assignments, told=value_told),
-    "press": Action("hold BOOLEANs at TRUE for a while", press_asks, add_press_arguments, means=Means.PRESS),
+    "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger"), done_text=message_text),
+    "set": Action("write commons once", _each_assignment("set"), _assignments, done_text=value_text),
+    "press": Action("hold BOOLEANs at TRUE for a while", press_calls, add_press_arguments, mode=Mode.PRESS),
     "get": Action(
         "read commons, array elements, variables of tasks",
         lambda given: [ServiceCall("get", "automax_msgs/ReadValues", {"names": given.names})],
@@ -258,12 +258,12 @@ ACTIONS: Mapping[str, Action] = {
         add_watch_arguments,
         values_of,
         value_lines,
-        means=Means.WATCH,
+        mode=Mode.WATCH,
     ),
     "force": Action("hold commons or TASK.NAME at values against every write", _each_assignment("force"), _assignments),
     "unforce": Action("end forces", _release, _released),
     "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=values_of, lines=value_lines),
-    "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments, told=value_told),
+    "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments, done_text=value_text),
     "module": Action("move a switch of a module", _moved("module"), _control("SLOT", "the module's slot")),
     "plant": Action(
         "break, mend or load the plant of a drive",
@@ -271,7 +271,7 @@ ACTIONS: Mapping[str, Action] = {
         _control("PLANT", "its name in the rack's file"),
         more=_plant_verbs,
     ),
-    "reload": Action("replace the source of a task while the others run", _reload, _reloaded, told=reload_told),
+    "reload": Action("replace the source of a task while the others run", _reload, _reloaded, done_text=reload_text),
     "clear": Action("clear error logs, so that faulted tasks can run again", _clear, _some_tasks),
     "errors": Action(
         "the error logs",

@@ -35,7 +35,7 @@ def add_press_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def press_asks(given: argparse.Namespace) -> list[ServiceCall]:
+def press_calls(given: argparse.Namespace) -> list[ServiceCall]:
     """Return the requests that set all names.
 
     Raises:
@@ -48,7 +48,7 @@ def press_asks(given: argparse.Namespace) -> list[ServiceCall]:
 
 
 def press(
-    answer: Answer, asks: Sequence[ServiceCall], given: argparse.Namespace, should_stop: Callable[[], bool]
+    answer: Answer, calls: Sequence[ServiceCall], given: argparse.Namespace, should_stop: Callable[[], bool]
 ) -> list[tuple[ServiceCall, Any]]:
     """Set all names at once, hold them, and reset those that were FALSE; return the answer for each.
 
@@ -57,20 +57,20 @@ def press(
     pressed: list[tuple[ServiceCall, Any]] = []
     found: list[tuple[ServiceCall, Any]] = []
     try:
-        for ask in asks:
-            set_to = answer(ask, given.timeout)
+        for call in calls:
+            set_to = answer(call, given.timeout)
             if set_to.ok and set_to.before == "TRUE":
-                reason = f"it was already 1: `set {ask.of}=0` lets it go"
-                found.append((ask, SimpleNamespace(ok=False, reason=reason)))
+                reason = f"it was already 1: `set {call.of}=0` lets it go"
+                found.append((call, SimpleNamespace(ok=False, reason=reason)))
             else:
-                found.append((ask, set_to))
-                pressed += [(ask, set_to)] if set_to.ok else []
+                found.append((call, set_to))
+                pressed += [(call, set_to)] if set_to.ok else []
         _hold(given.held if pressed else 0, should_stop)
     finally:
-        for ask, _ in pressed:
-            released = answer(ServiceCall("set", _SET, {"name": ask.of, "value": "FALSE"}, ask.of), given.timeout)
+        for call, _ in pressed:
+            released = answer(ServiceCall("set", _SET, {"name": call.of, "value": "FALSE"}, call.of), given.timeout)
             if not released.ok:
-                found = [item if item[0] is not ask else (ask, released) for item in found]
+                found = [item if item[0] is not call else (call, released) for item in found]
     return found
 
 

@@ -29,13 +29,13 @@ def run_shell(arguments: argparse.Namespace) -> int:
     interrupt = Interrupt()
     with interrupt.watching(), connected(arguments, interrupt.taken) as session:
         shell = _Shell(session, arguments)
-        session.ask(_STATUS, arguments.timeout)
+        session.call(_STATUS, arguments.timeout)
         interactive = sys.stdin.isatty()
         if interactive:
             edit_lines(shell.completions)
             print("help lists the actions, Ctrl-D leaves", flush=True)
         lines: Iterable[str] = typed_lines(f"{arguments.rack}> ", interrupt) if interactive else sys.stdin
-        failed = shell.obey_all(lines)
+        failed = shell.execute_all(lines)
     return int(failed and not interactive)
 
 
@@ -48,14 +48,14 @@ class _Shell:
         self._parser = argparse.ArgumentParser(prog="automax ctl", usage="ACTION ...", add_help=False)
         add_actions(self._parser)
 
-    def obey_all(self, lines: Iterable[str]) -> bool:
+    def execute_all(self, lines: Iterable[str]) -> bool:
         """Carry out lines until their end or quit; return whether one failed."""
         failed = False
         for line in lines:
             words = self._words(line)
             if words and words[0] in _QUIT:
                 break
-            failed |= words is None or (bool(words) and self._obeyed(words) != 0)
+            failed |= words is None or (bool(words) and self._executed(words) != 0)
             sys.stdout.flush()
         return failed
 
@@ -74,7 +74,7 @@ class _Shell:
             print(f"automax ctl: {error}: quote a name with a blank or a * in it", file=sys.stderr)
             return None
 
-    def _obeyed(self, words: list[str]) -> int:
+    def _executed(self, words: list[str]) -> int:
         from automax_ros.ros.clients.rack_client import Interrupted
 
         try:
@@ -101,12 +101,12 @@ class _Shell:
     def _known(self) -> list[str]:
         """Return the names of commons and tasks, as far as the rack answers."""
         wait_ns = self._given.timeout
-        asks = [
+        calls = [
             ServiceCall("get", "automax_msgs/ReadValues", {"names": ["*"]}),
             ServiceCall("tasks", "automax_msgs/ReadTasks"),
         ]
         try:
-            commons, tasks = (self._session.ask(ask, wait_ns) for ask in asks)
+            commons, tasks = (self._session.call(call, wait_ns) for call in calls)
         except UserError:
             return []
         found = list(commons.found) if commons is not None else []

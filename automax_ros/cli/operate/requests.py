@@ -23,7 +23,7 @@ class ServiceCall:
     reword: Callable[[str], str] = str
 
 
-class Means(Enum):
+class Mode(Enum):
     """How the requests of an action are sent: each once, repeatedly, or as a press of buttons."""
 
     ONCE = "once"
@@ -39,18 +39,18 @@ def _done(_: ServiceCall, __: Any) -> str:
 class Action:
     """An action: its line of help, its arguments, its requests, and the presentation of answers.
 
-    ``read`` returns the data of an answer for JSON, ``lines`` the lines of text for these data, ``told`` the text for
-    an operation that was carried out. ``by_operator``: it needs a rack with the operator's services; ``acts``: it
+    ``read`` returns the data of an answer for JSON, ``lines`` the lines of text for these data, ``done_text`` the text
+    for an operation that was carried out. ``by_operator``: it needs a rack with the operator's services; ``acts``: it
     changes something, although its answer is read. ``more`` returns the text below its help.
     """
 
     help: str
-    asks: Callable[[argparse.Namespace], list[ServiceCall]]
+    calls: Callable[[argparse.Namespace], list[ServiceCall]]
     add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
     read: Callable[[Any], Any] | None = None
     lines: Callable[[Any], Iterable[str]] = lambda _: ()
-    told: Callable[[ServiceCall, Any], str] = _done
-    means: Means = Means.ONCE
+    done_text: Callable[[ServiceCall, Any], str] = _done
+    mode: Mode = Mode.ONCE
     by_operator: bool = True
     acts: bool = False
     more: Callable[[], str] = str

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from automax_ros.cli.operate.actions import STATE
 from automax_ros.cli.operate.press import press
-from automax_ros.cli.operate.requests import Action, Means, ServiceCall
+from automax_ros.cli.operate.requests import Action, Mode, ServiceCall
 from automax_ros.cli.operate.text import ALREADY
 from automax_ros.cli.operate.watch import values_of, watch
 from automax_ros.cli.options.rack_name import space_of
@@ -40,24 +40,24 @@ class Session:
 
     def do(self, action: Action, arguments: argparse.Namespace) -> int:
         """Carry out an action; 1 where the rack refused something."""
-        asks = action.asks(arguments)
+        calls = action.calls(arguments)
         if action.by_operator:
             self._find(arguments.timeout, alone=not action.reads)
         elif arguments.transition != STATE:
             self._client.refuse_twins(arguments.node)
-        if action.means is Means.WATCH:
-            return self._watch(asks[0], arguments)
-        if action.means is Means.PRESS:
-            answers = press(self._answer, asks, arguments, self._should_stop)
+        if action.mode is Mode.WATCH:
+            return self._watch(calls[0], arguments)
+        if action.mode is Mode.PRESS:
+            answers = press(self._answer, calls, arguments, self._should_stop)
         else:
-            answers = [(ask, self._answer(ask, arguments.timeout)) for ask in asks]
+            answers = [(call, self._answer(call, arguments.timeout)) for call in calls]
         (_print_json if arguments.json else _print)(action, arguments.action, answers)
         return 0 if all(_ok(answer) for _, answer in answers) else 1
 
-    def ask(self, ask: ServiceCall, wait_ns: int) -> Any:
+    def call(self, call: ServiceCall, wait_ns: int) -> Any:
         """Return the answer to one request that only reads; None where it was refused."""
         self._find(wait_ns, alone=False)
-        answer = self._answer(ask, wait_ns)
+        answer = self._answer(call, wait_ns)
         return answer if _ok(answer) else None
 
     def _find(self, wait_ns: int, *, alone: bool) -> None:
@@ -76,18 +76,18 @@ class Session:
             self._client.refuse_several(known)
             self._client.find(wait_ns, 0 if known == 1 and is_this_host_alone() else ALONE_NS)
 
-    def _answer(self, ask: ServiceCall, wait_ns: int) -> Any:
-        package, _, name = ask.type_name.partition("/")
+    def _answer(self, call: ServiceCall, wait_ns: int) -> Any:
+        package, _, name = call.type_name.partition("/")
         kind = getattr(importlib.import_module(f"{package}.srv"), name)
-        return self._client.call(kind, ask.service, kind.Request(**ask.fields), wait_ns)
+        return self._client.call(kind, call.service, kind.Request(**call.fields), wait_ns)
 
-    def _watch(self, ask: ServiceCall, arguments: argparse.Namespace) -> int:
+    def _watch(self, call: ServiceCall, arguments: argparse.Namespace) -> int:
         from automax_ros.ros.clients.rack_client import Interrupted
 
         def read() -> list[dict[str, str]]:
-            answer = self._answer(ask, arguments.timeout)
+            answer = self._answer(call, arguments.timeout)
             if not _ok(answer):
-                raise _Refused(_reason(ask, answer))
+                raise _Refused(_reason(call, answer))
             return values_of(answer)
 
         try:
@@ -95,7 +95,7 @@ class Session:
         except Interrupted:
             return 0
         except _Refused as refusal:
-            _complain("watch", ask, str(refusal))
+            _complain("watch", call, str(refusal))
             return 1
         return 0
 
@@ -123,23 +123,23 @@ def _ok(answer: Any) -> bool:
     return bool(getattr(answer, "ok", getattr(answer, "success", True)))
 
 
-def _reason(ask: ServiceCall, answer: Any) -> str:
-    return ask.reword(getattr(answer, "reason", getattr(answer, "message", "")))
+def _reason(call: ServiceCall, answer: Any) -> str:
+    return call.reword(getattr(answer, "reason", getattr(answer, "message", "")))
 
 
-def _complain(what: str, ask: ServiceCall, reason: str) -> None:
-    print(f"automax ctl: {printable(' '.join((what, ask.of)).strip())}: refused: {printable(reason)}", file=sys.stderr)
+def _complain(what: str, call: ServiceCall, reason: str) -> None:
+    print(f"automax ctl: {printable(' '.join((what, call.of)).strip())}: refused: {printable(reason)}", file=sys.stderr)
 
 
 def _print(action: Action, what: str, answers: Answers) -> None:
-    for ask, answer in answers:
+    for call, answer in answers:
         for text in getattr(answer, "findings", ()):
-            print(ask.reword(text), file=sys.stderr)
+            print(call.reword(text), file=sys.stderr)
         if not _ok(answer):
-            _complain(what, ask, _reason(ask, answer))
+            _complain(what, call, _reason(call, answer))
         elif action.read is None:
-            told = action.told(ask, answer) or "done"
-            print(printable(f"{what} {ask.of}: {told}" if ask.of else f"{what}: {told}"))
+            done_text = action.done_text(call, answer) or "done"
+            print(printable(f"{what} {call.of}: {done_text}" if call.of else f"{what}: {done_text}"))
         else:
             for line in action.lines(action.read(answer)):
                 print(printable(line))
@@ -147,16 +147,16 @@ def _print(action: Action, what: str, answers: Answers) -> None:
 
 def _print_json(action: Action, what: str, answers: Answers) -> None:
     found = []
-    for ask, answer in answers:
+    for call, answer in answers:
         ok = _ok(answer)
-        entry: dict[str, Any] = {"what": what, "of": ask.of, "ok": ok, "reason": "" if ok else _reason(ask, answer)}
+        entry: dict[str, Any] = {"what": what, "of": call.of, "ok": ok, "reason": "" if ok else _reason(call, answer)}
         if ok and action.read is None:
-            told = [shown for name in _NOW if (shown := getattr(answer, name, "")) != ""]
-            entry |= {"now": told[0]} if told else {}
-            entry |= {"already": True} if action.told(ask, answer).startswith(ALREADY) else {}
+            now = [shown for name in _NOW if (shown := getattr(answer, name, "")) != ""]
+            entry |= {"now": now[0]} if now else {}
+            entry |= {"already": True} if action.done_text(call, answer).startswith(ALREADY) else {}
             entry |= {"lost": text} if (text := getattr(answer, "lost", "")) else {}
         if getattr(answer, "findings", ()):
-            entry["findings"] = [ask.reword(text) for text in answer.findings]
+            entry["findings"] = [call.reword(text) for text in answer.findings]
         if action.read is not None and ok:
             entry["answer"] = action.read(answer)
         found.append(entry)

@@ -79,26 +79,26 @@ def status_lines(data: Any) -> Iterable[str]:
         yield f"did not answer, and is missing above: {', '.join(data['absent'])}"
 
 
-def message_told(_: ServiceCall, answer: Any) -> str:
+def message_text(_: ServiceCall, answer: Any) -> str:
     """Return the text for an operation that was carried out."""
-    told = getattr(answer, "message", "")
-    return f"done, {told}" if told else "done"
+    message = getattr(answer, "message", "")
+    return f"done, {message}" if message else "done"
 
 
-def value_told(ask: ServiceCall, answer: Any) -> str:
+def value_text(call: ServiceCall, answer: Any) -> str:
     """Return the text for a value that was written, or that the variable had already."""
-    if answer.before and answer.before == answer.now and answer.now == _written(ask):
-        return f"{ALREADY} {ask.fields['value'].strip()}"
+    if answer.before and answer.before == answer.now and answer.now == _written(call):
+        return f"{ALREADY} {call.fields['value'].strip()}"
     return "done"
 
 
-def reload_told(_: ServiceCall, answer: Any) -> str:
+def reload_text(_: ServiceCall, answer: Any) -> str:
     """Return the text for a reload, with what was lost."""
     return f"done; {answer.lost}: --keep-state keeps what was tuned" if answer.lost else "done"
 
 
-def _written(ask: ServiceCall) -> str:
+def _written(call: ServiceCall) -> str:
     """Return the value of a request as a program writes it, "" where it is not a value."""
-    name, text = "".join(ask.fields["name"].split()).partition("(")[0], ask.fields["value"]
+    name, text = "".join(call.fields["name"].split()).partition("(")[0], call.fields["value"]
     value = value_of(text.strip(), type_of_name(name.partition("[")[0].upper()))
     return "" if value is None else source_text(value)

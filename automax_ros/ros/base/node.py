@@ -27,7 +27,7 @@ from rclpy.qos import QoSProfile, qos_policy_name_from_kind
 
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.messages.types.topics import Take, Topic
+from automax_ros.messages.types.topics import SCAN, Take, Topic
 from automax_ros.rack.rack import Rack
 from automax_ros.ros.base.diagnostics import Diagnostics, Source, status_of
 from automax_ros.ros.base.qos import message_class, ros_qos
@@ -45,6 +45,8 @@ MAIN_NODE = "rack"
 """The node that a rule ``__node`` without a node's name renames."""
 SIM_TIME = "use_sim_time"
 """Parameter of every node: whether its time is that of ``/clock``."""
+RECORDED_DEPTH = 10_000
+"""Messages of a stream that a process keeps for its recorder while that is held up (decision: several seconds)."""
 _OF_RCLPY = (SIM_TIME, "start_type_description_service")
 
 
@@ -151,6 +153,7 @@ class RackContext:
         arguments: their ROS arguments from the command line.
         diagnostics: publishes their health.
         lock: held by the thread that accesses the rack; one at a time, between scans.
+        is_recorded: whether a recorder started with it must receive every message of a stream.
     """
 
     rack: Rack
@@ -162,6 +165,7 @@ class RackContext:
     arguments: RosArguments = NO_ARGUMENTS
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     lock: RackLock = field(default_factory=RackLock)
+    is_recorded: bool = False
 
     @property
     def holds_common_memory(self) -> bool:
@@ -211,7 +215,10 @@ class ModuleNode(RackRosNode):
             incompatible_qos=self.guarded_callback(topic.name, incompatible),
         )
         kind = message_class(topic.type_name)
-        publish = self.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events).publish
+        qos = ros_qos(topic.qos)
+        if self.site.is_recorded and topic.qos is SCAN:
+            qos.depth = RECORDED_DEPTH
+        publish = self.create_publisher(kind, topic.name, qos, event_callbacks=events).publish
         return lambda _, payload: publish(payload)
 
     def diagnose(self, statuses: Source) -> None:

@@ -45,7 +45,7 @@ def operate_name(module: str, service: str) -> str:
 
 
 @dataclass(frozen=True)
-class Target:
+class PartRequest:
     """A request to one process: its seat, ``THIS_PROCESS`` for this one, and the request."""
 
     seat: int
@@ -64,7 +64,7 @@ class RequestForwarder:
         config = node.site.rack.config
         self._node, self._bus, self._config = node, bus, config
         home = bus.peers.seat
-        self._seats = [seat for seat in bus.seats if seat != home]
+        self._others = [seat for seat in bus.seats if seat != home]
         seat_of = {slot: THIS_PROCESS if seat == home else seat for seat, slots in bus.seats.items() for slot in slots}
         self._tasks = {task.name: seat_of[module.slot] for module, task in config.placed_tasks}
         self._slots = {str(slot): seat for slot, seat in seat_of.items()}
@@ -76,25 +76,23 @@ class RequestForwarder:
         concerns = VERBS[service].concerns
         if concerns is Concerns.NONE:
             return conclude(response, ok=False, reason=NOT_TOGETHER)
-        shares = self._targets(concerns, request, kind)
-        if [share.seat for share in shares] == [THIS_PROCESS]:
-            return local(shares[0].request, response)
-        absent = [
-            self._name(share.seat) for share in shares if share.seat not in (THIS_PROCESS, *self._bus.peers.by_seat)
-        ]
-        if absent and len(shares) == 1:
+        parts = self._parts(concerns, request, kind)
+        if [part.seat for part in parts] == [THIS_PROCESS]:
+            return local(parts[0].request, response)
+        absent = [self._name(part.seat) for part in parts if part.seat not in (THIS_PROCESS, *self._bus.peers.by_seat)]
+        if absent and len(parts) == 1:
             return conclude(response, ok=False, reason=f"{absent[0]} is not there: start its process again")
-        answers: dict[int, Any] = {share.seat: None for share in shares}
-        for share in shares:
-            if share.seat == THIS_PROCESS:
-                answers[THIS_PROCESS] = local(share.request, kind.Response())
+        answers: dict[int, Any] = {part.seat: None for part in parts}
+        for part in parts:
+            if part.seat == THIS_PROCESS:
+                answers[THIS_PROCESS] = local(part.request, kind.Response())
 
         def begin(respond: Respond) -> None:
-            _PendingRequest(self, service, kind, shares, answers, lambda: respond(end()))
+            _PendingRequest(self, service, kind, parts, answers, lambda: respond(end()))
 
         def end() -> Any:
-            silent = [self._name(share.seat) for share in shares if answers[share.seat] is None]
-            found = _merged(response, request, shares, answers, silent)
+            silent = [self._name(part.seat) for part in parts if answers[part.seat] is None]
+            found = _merged(response, request, parts, answers, silent)
             if service == "reload" and _is_ok(found):
                 self._note_source(request)
             return found
@@ -125,38 +123,38 @@ class RequestForwarder:
         """Return whether a process is present."""
         return seat in self._bus.peers.by_seat
 
-    def _targets(self, concerns: Concerns, request: Any, kind: Any) -> list[Target]:
+    def _parts(self, concerns: Concerns, request: Any, kind: Any) -> list[PartRequest]:
         """Return a request to each process that it concerns; this one refuses unknown names."""
         if concerns is Concerns.NAMES and request.names:
             groups: dict[int, list[str]] = {}
             for name in request.names:
-                groups.setdefault(self._seat_of_name(name), []).append(name)
-            return [Target(seat, kind.Request(names=names)) for seat, names in groups.items()]
+                groups.setdefault(self._process_of_name(name), []).append(name)
+            return [PartRequest(seat, kind.Request(names=names)) for seat, names in groups.items()]
         if (
             concerns in (Concerns.ALL, Concerns.NAMES)
             or (concerns is Concerns.TASK and not request.task.strip())
             or (concerns is Concerns.STATUS and not request.home_only)
         ):
-            return [Target(THIS_PROCESS, request), *(Target(seat, request) for seat in self._seats)]
+            return [PartRequest(THIS_PROCESS, request), *(PartRequest(seat, request) for seat in self._others)]
         if concerns is Concerns.TASK:
-            seat = self._seat_of_task(request.task)
+            seat = self._process_of_task(request.task)
         elif concerns is Concerns.NAME:
-            seat = self._seat_of_name(request.name)
+            seat = self._process_of_name(request.name)
         elif concerns is Concerns.SLOT:
             seat = self._slots.get(request.name.strip(), THIS_PROCESS)
         elif concerns is Concerns.PLANT:
             seat = self._slots.get(str(self._plants.get(request.name.strip().upper(), "")), THIS_PROCESS)
         else:
             seat = THIS_PROCESS
-        return [Target(seat, request)]
+        return [PartRequest(seat, request)]
 
-    def _seat_of_task(self, text: str) -> int:
+    def _process_of_task(self, text: str) -> int:
         return self._tasks.get(text.strip().upper(), THIS_PROCESS)
 
-    def _seat_of_name(self, text: str) -> int:
+    def _process_of_name(self, text: str) -> int:
         """Return the process that holds ``TASK.NAME``, this one for common variables."""
         task, point, _ = text.partition(".")
-        return self._seat_of_task(task) if point else THIS_PROCESS
+        return self._process_of_task(task) if point else THIS_PROCESS
 
     def _name(self, seat: int) -> str:
         return part_name(self._config, self._bus.seats[seat]) if seat in self._bus.seats else quoted(str(seat))
@@ -173,34 +171,34 @@ class _PendingRequest:
         forwarding: RequestForwarder,
         service: str,
         kind: Any,
-        shares: Sequence[Target],
+        parts: Sequence[PartRequest],
         answers: dict[int, Any],
         done: Callable[[], None],
     ) -> None:
         self._answers, self._done, self._node = answers, done, forwarding.node
-        asked = [share for share in shares if share.seat != THIS_PROCESS and forwarding.is_there(share.seat)]
-        self._open = {share.seat for share in asked}
-        self._unasked = [(share, forwarding.client(share.seat, service, kind)) for share in asked]
+        called = [part for part in parts if part.seat != THIS_PROCESS and forwarding.is_there(part.seat)]
+        self._open = {part.seat for part in called}
+        self._not_called = [(part, forwarding.client(part.seat, service, kind)) for part in called]
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         wait_s = RELOAD_ANSWER_S if service == "reload" else ANSWER_S
         self._timers = [
             self._node.create_timer(wait_s, self._end, clock=steady),
-            self._node.create_timer(FIND_S, self._ask, clock=steady),
+            self._node.create_timer(FIND_S, self._call_discovered, clock=steady),
         ]
-        if asked:
-            self._ask()
+        if called:
+            self._call_discovered()
         else:
             self._end()
 
-    def _ask(self) -> None:
+    def _call_discovered(self) -> None:
         """Call the processes whose service is discovered by now."""
-        waiting, self._unasked = self._unasked, []
-        for share, client in waiting:
+        waiting, self._not_called = self._not_called, []
+        for part, client in waiting:
             if client.service_is_ready():
-                future = client.call_async(share.request)
-                future.add_done_callback(lambda found, seat=share.seat: self._answered(seat, found))
+                future = client.call_async(part.request)
+                future.add_done_callback(lambda found, seat=part.seat: self._answered(seat, found))
             else:
-                self._unasked.append((share, client))
+                self._not_called.append((part, client))
 
     def _answered(self, seat: int, future: Any) -> None:
         with self._node.site.between_scans():
@@ -221,7 +219,7 @@ class _PendingRequest:
 
 
 def _merged(
-    response: Any, request: Any, shares: Sequence[Target], answers: dict[int, Any], silent: Sequence[str]
+    response: Any, request: Any, parts: Sequence[PartRequest], answers: dict[int, Any], silent: Sequence[str]
 ) -> Any:
     """Return one response: lists concatenated, numbers of tasks added up, OK if all are.
 
@@ -229,7 +227,7 @@ def _merged(
     can name them (``absent``) holds the answers received; any other is a refusal.
     """
     found = [answer for answer in answers.values() if answer is not None]
-    if len(shares) == 1 and found:
+    if len(parts) == 1 and found:
         return found[0]
     reasons = [reason for answer in found if (reason := _reason_of(answer)) and not _is_ok(answer)]
     if silent:

@@ -1,4 +1,4 @@
-"""What `automax ctl` asks of a rack for the words that a user writes."""
+"""What `automax ctl` calls of a rack for the words that a user writes."""
 
 import argparse
 import importlib
@@ -15,7 +15,7 @@ from automax_ros.core.user_error import UsageError, UserError
 def asked(action: str, *words: str) -> list[dict[str, object]]:
     parser = argparse.ArgumentParser()
     ACTIONS[action].add_arguments(parser)
-    return [dict(ask.fields) for ask in ACTIONS[action].asks(parser.parse_args(words))]
+    return [dict(call.fields) for call in ACTIONS[action].calls(parser.parse_args(words))]
 
 
 def test_all_means_all_as_in_stimuli():
@@ -36,11 +36,11 @@ def test_what_is_found_in_a_sent_source_is_named_by_the_file_that_was_given(tmp_
     file.write_text("10 END\n")
     parser = argparse.ArgumentParser()
     ACTIONS["reload"].add_arguments(parser)
-    (ask,) = ACTIONS["reload"].asks(parser.parse_args(["speed", str(file)]))
+    (call,) = ACTIONS["reload"].calls(parser.parse_args(["speed", str(file)]))
     found = "SPEED.BLK:1:1: error[AMX2001]: END\n  1 | 10 END\nSPEED.BLK:2:3: note: here"
-    assert ask.reword(found) == f"{file}:1:1: error[AMX2001]: END\n  1 | 10 END\n{file}:2:3: note: here"
-    assert ask.reword("SPEED.BLK has errors: task SPEED") == f"{file} has errors: task SPEED"
-    assert ask.reword("sd/LINE.BLK:1:1: error") == "sd/LINE.BLK:1:1: error"
+    assert call.reword(found) == f"{file}:1:1: error[AMX2001]: END\n  1 | 10 END\n{file}:2:3: note: here"
+    assert call.reword("SPEED.BLK has errors: task SPEED") == f"{file} has errors: task SPEED"
+    assert call.reword("sd/LINE.BLK:1:1: error") == "sd/LINE.BLK:1:1: error"
 
 
 def test_a_rack_is_named_by_its_folder_as_well_as_by_its_file(tmp_path, monkeypatch):
@@ -94,9 +94,9 @@ def test_every_action_asks_a_service_with_fields_that_it_has(name, tmp_path):
     given = words.get(name) or (("A%=1",) if name in assigned else ("A",) if name in named else ())
     parser = argparse.ArgumentParser()
     ACTIONS[name].add_arguments(parser)
-    for ask in ACTIONS[name].asks(parser.parse_args(list(given))):
-        package, _, kind = ask.type_name.partition("/")
-        assert getattr(importlib.import_module(f"{package}.srv"), kind).Request(**ask.fields)
+    for call in ACTIONS[name].calls(parser.parse_args(list(given))):
+        package, _, kind = call.type_name.partition("/")
+        assert getattr(importlib.import_module(f"{package}.srv"), kind).Request(**call.fields)
 
 
 def test_an_answer_with_more_names_than_values_is_an_error_and_no_traceback():

@@ -95,10 +95,10 @@ def test_what_is_pressed_already_or_unknown_is_refused_and_the_others_are_let_go
     rack = Rack(**{"A@": "FALSE", "B@": "TRUE"})
     assert do(rack, "press", "A@", "B@", "NIL@", "--for", "0.01") == 1
     assert rack.values == {"A@": "FALSE", "B@": "TRUE"}
-    told = capsys.readouterr()
-    assert told.out == "press A@: done\n"
-    assert "press B@: refused: it was already 1: `set B@=0` lets it go" in told.err
-    assert "press NIL@: refused: no NIL@" in told.err
+    done_text = capsys.readouterr()
+    assert done_text.out == "press A@: done\n"
+    assert "press B@: refused: it was already 1: `set B@=0` lets it go" in done_text.err
+    assert "press NIL@: refused: no NIL@" in done_text.err
 
 
 def test_only_booleans_are_pressed():
@@ -176,10 +176,10 @@ def test_no_control_character_of_an_answer_is_printed(action, capsys):
         do(rack, *words)
     finally:
         output.undo()
-    told = capsys.readouterr()
-    assert not RAW.findall(told.out + told.err)
-    assert "\N{REPLACEMENT CHARACTER}" in told.out + told.err
-    assert not re.search("^rack PM1", told.out + told.err, re.MULTILINE), "no line of its own"
+    done_text = capsys.readouterr()
+    assert not RAW.findall(done_text.out + done_text.err)
+    assert "\N{REPLACEMENT CHARACTER}" in done_text.out + done_text.err
+    assert not re.search("^rack PM1", done_text.out + done_text.err, re.MULTILINE), "no line of its own"
     do(rack, *words, "--json")
     assert not RAW.findall(capsys.readouterr().out)
 
@@ -199,10 +199,10 @@ def test_a_prompt_goes_on_after_errors_and_ends_with_its_input(monkeypatch, caps
     lines = "get REF%\nfoo\nset 'REF%\npress REF%\n\n# a remark\nset REF%=7\nset NIL%=1\nquit\nset REF%=8\n"
     monkeypatch.setattr("sys.stdin", io.StringIO(lines))
     code = run_shell(argparse.Namespace(rack="PM1", timeout=10**9))
-    told = capsys.readouterr()
+    done_text = capsys.readouterr()
     assert (code, rack.values["REF%"]) == (1, "7")
-    assert told.out == "REF% = 5\nset REF% = 7: done\n"
-    assert "invalid choice: 'foo'" in told.err
-    assert "No closing quotation" in told.err
-    assert "cannot be pressed" in told.err
-    assert "set NIL% = 1: refused: no NIL%" in told.err
+    assert done_text.out == "REF% = 5\nset REF% = 7: done\n"
+    assert "invalid choice: 'foo'" in done_text.err
+    assert "No closing quotation" in done_text.err
+    assert "cannot be pressed" in done_text.err
+    assert "set NIL% = 1: refused: no NIL%" in done_text.err
