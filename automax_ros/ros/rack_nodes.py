@@ -69,7 +69,7 @@ LOOK_S = 0.02
 """Seconds between two checks whether the other processes are present."""
 DELIVERY_NS = NS_PER_S
 """How long a rack that ends waits for its subscribers to have received its last messages (decision)."""
-DELIVERY_TO_RECORDER_NS = 5 * NS_PER_S
+DELIVERY_TO_RECORDER_NS = 20 * NS_PER_S
 """The same for a process that began with its recorder, whose recording must be whole (decision)."""
 
 _Beginning = tuple[Sequence[tuple[str, Value]], "Callable[[], None] | None"]

@@ -13,7 +13,7 @@ from system.support import PATIENCE_S, RACKS, TYPES, wait_until
 
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.base.observers import Observers
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
@@ -357,9 +357,12 @@ print(*(f"{task}={scan}" for task, scan in sorted(last.items())), flush=True)
 """
 
 
-def test_a_rack_that_ends_waits_for_a_reader_that_is_late(context, ros_domain_id, tmp_path):
+def test_a_rack_that_ends_waits_for_a_reader_that_is_late(context, ros_domain_id, tmp_path, monkeypatch):
     """What the reader's socket dropped while the reader was held up is sent again before the rack leaves the graph."""
+    from automax_ros.ros import rack_nodes
     from automax_ros.ros.rack_nodes import RackNodes
+
+    monkeypatch.setattr(rack_nodes, "DELIVERY_NS", int(PATIENCE_S * NS_PER_S))
 
     (tmp_path / "small.xml").write_text(SMALL_BUFFER)
     environment = os.environ | {"FASTRTPS_DEFAULT_PROFILES_FILE": str(tmp_path / "small.xml")}

@@ -45,6 +45,8 @@ class Session:
             self._find(arguments.timeout, alone=not action.reads)
         elif arguments.transition != STATE:
             self._client.refuse_twins(arguments.node)
+            if self._client.has_operator:
+                self._find(arguments.timeout, alone=True)
         if action.mode is Mode.WATCH:
             return self._watch(calls[0], arguments)
         if action.mode is Mode.PRESS:

@@ -29,7 +29,7 @@ _SEATS, _HOME, _RECORDER = range(3)
 _RECORDER_NAME = "recorder"
 _RECORDER_WAIT_S = "60"
 """How long the recorder waits for the rack, whose processes take a while to start, s (decision)."""
-_RECORDER_AFTER_NS = 6 * NS_PER_S
+_RECORDER_AFTER_NS = 25 * NS_PER_S
 """How long the recorder takes the last messages of common memory's process, which waits until they have arrived."""
 _WHOLE = "distributed"
 """The seat under which the supervising process holds the lock."""

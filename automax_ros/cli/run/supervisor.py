@@ -28,7 +28,7 @@ _LOOK_S = 0.05
 STAGE_NS = 800 * NS_PER_MS
 """Time that the processes of a stage have to end before those of the next are asked to."""
 END_NS = 10 * NS_PER_S
-"""A process that has not exited this long after SIGTERM is killed."""
+"""A process that has not exited this long after SIGTERM is killed; the longest ``after_ns`` comes on top."""
 GRACE_NS = 2 * NS_PER_S
 """Time that the other processes have to end by themselves after the first one has."""
 
@@ -223,7 +223,6 @@ class Supervisor:
         if self._stage < 0:
             self._stage = 0
             self._asked_ns = self._clock() + grace_ns
-            self._stage_ns = self._asked_ns - END_NS
             for place in self._places:
                 place.start_ns = None
 
@@ -237,11 +236,11 @@ class Supervisor:
         stage = min((post.stage for post, _ in rest), default=0)
         due = [(post, child) for post, child in rest if post.stage == stage]
         patience_ns = max((post.after_ns for post, _ in due), default=0)
-        if due and (now >= self._stage_ns + patience_ns or len(rest) == len(alive)):
+        if due and (self._stage == 0 or now >= self._stage_ns + patience_ns or len(rest) == len(alive)):
             for _, child in due:
                 child.send(signal.SIGTERM)
             self._stage, self._stage_ns = stage + 1, now
-        if now >= self._asked_ns + END_NS:
+        if now >= self._asked_ns + END_NS + max((post.after_ns for post, _ in alive), default=0):
             for _, child in alive:
                 child.send(signal.SIGKILL)
 

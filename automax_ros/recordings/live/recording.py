@@ -39,6 +39,8 @@ SETTLE_NS = NS_PER_S
 """If no write is received for this long, none is missing."""
 LATE_NS = 10 * NS_PER_S
 """Longest wait for a scan's write (decision): on a busy host the process of common memory may be late."""
+MOST_EARLY = 16
+"""Most states of a task that wait for its scans (decision: a task sends one where it starts or ends, or when asked)."""
 MAX_PENDING = 100_000
 """Most messages that wait for the next write."""
 _RESTARTED = "the rack was started again"
@@ -157,6 +159,9 @@ class LiveRecording(Recording):
         if self.failure is None and self.ended is None:
             with self._enduring():
                 self._settle(at_end=True)
+                for track in self._tasks.values():
+                    track.follows = False
+                    self._record_early(track)
         if self.failure is None:
             replayable_s = None if self.replayable_from is None else self.seconds(self.replayable_from)
             gaps = [f"{self.seconds(gap.stamp):.6f} s: {gap}" for gap in self.gaps]
@@ -228,6 +233,13 @@ class LiveRecording(Recording):
         self.scans += 1
         self._write(topic, sent_ns, head.stamp, payload)
         self._look_whether_replayable(head.stamp)
+        self._record_early(track)
+
+    def _record_early(self, track: TaskProgress) -> None:
+        """Record the states of a task whose scans are recorded by now."""
+        early, track.early = track.early, []
+        for topic, sent_ns, payload in early:
+            self._record_state(topic, sent_ns, payload)
 
     def _record_state(self, topic: str, sent_ns: int, payload: bytes) -> None:
         state: Any = decode("automax_msgs/msg/TaskState", payload)
@@ -237,6 +249,9 @@ class LiveRecording(Recording):
             return
         if track.began_anew(state.scan, state.stamp, proven=self._proves):
             self._end(_RESTARTED)
+            return
+        if track.follows and state.scan > track.last and len(track.early) < MOST_EARLY:
+            track.early.append((topic, sent_ns, payload))
             return
         if track.state < 0:
             self._compare_source(state.task, state.source_hash)

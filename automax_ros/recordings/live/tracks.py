@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 from automax_ros.messages.cdr.cdr import CdrError, decode
@@ -57,7 +57,8 @@ class TaskProgress:
     """The recorded part of one task: number and stamp of its last scan, number of the last scan with a state.
 
     ``follows``: every scan since a full one is recorded. ``ready``: a state belongs to them, so they can be executed
-    again. ``alone``: that is true for the present file of a split recording, too.
+    again. ``alone``: that is true for the present file of a split recording, too. ``early`` are its states that arrived
+    before the scan that they follow, with their topic and time of sending.
     """
 
     last: int = -1
@@ -66,6 +67,7 @@ class TaskProgress:
     follows: bool = False
     ready: bool = False
     alone: bool = False
+    early: list[tuple[str, int, bytes]] = field(default_factory=list)
 
     def begin_file(self) -> None:
         """Wait for a state in a further file; scans continue."""

@@ -114,6 +114,11 @@ class RackClient:
             self._go_on()
             time.sleep(_LOOK_S)
 
+    @property
+    def has_operator(self) -> bool:
+        """Whether the rack's operator is seen."""
+        return self._nodes(_OPERATOR) > 0
+
     def refuse_several(self, racks: int) -> None:
         """Check that at most one rack of the name is known.
 
