@@ -15,12 +15,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil, floor
+from typing import Any
 
 from automax_ros.blocks.declare.coefficients import is_within
-from automax_ros.blocks.declare.declaration import Block, Fault, Form, Given, Input, LineScan, Output, Platform, Times
+from automax_ros.blocks.declare.declaration import (
+    Block,
+    Fault,
+    Form,
+    Given,
+    Input,
+    LineScan,
+    Output,
+    Platform,
+    Rule,
+    Times,
+)
 from automax_ros.blocks.declare.rules import Needs
 from automax_ros.core.ticks import DEFAULT_TICK_NS
-from automax_ros.core.types import DataType, Value
+from automax_ros.core.types import DataType
 
 LIMITS: dict[str, tuple[float, float]] = {
     "IO_CNTL_SLOT": (0, 15),
@@ -88,27 +100,23 @@ def ioc_is_possible(ioc_thresh: int, lim_bar: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Advised:
+class Advised(Rule):
     """A parameter without which the manual warns of a CALL; ``without`` says what the CALL then lacks."""
 
     parameter: str
     without: str
     code: str
+    sentence = "In a speed regulator {rule.parameter} must be programmed: without it there is {rule.without} (52.1.5)."
 
-    @property
-    def text(self) -> str:
-        """The rule as a sentence."""
-        return f"In a speed regulator {self.parameter} must be programmed: without it there is {self.without} (52.1.5)."
-
-    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
+    def fault(self, given: Mapping[str, Given]) -> Fault | None:
         """Return the warning of a CALL without the parameter."""
         if self.parameter in given:
-            return []
-        return [Fault(f"there is {self.without} without {self.parameter}", None, self.code)]
+            return None
+        return Fault(f"there is {self.without} without {self.parameter}", None, self.code)
 
 
 @dataclass(frozen=True)
-class WithinAtLine:
+class WithinAtLine(Rule):
     """A literal's limits follow the line's frequency: the literal ``frequency`` or its default in Hz."""
 
     parameter: str
@@ -121,37 +129,33 @@ class WithinAtLine:
         at = " and ".join(f"{_range(self.parameter, hz)} at {hz} Hz" for hz in (60, 50))
         return f"{self.parameter} must be {at}."
 
-    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
+    def fault(self, given: Mapping[str, Given]) -> Fault | None:
         """Return the fault of a literal beyond its limits; none where the frequency itself is at fault."""
         value = given[self.parameter].value if self.parameter in given else None
         line_hz = given[self.frequency].value if self.frequency in given else self.default_hz
         if not isinstance(value, (int, float)) or not isinstance(line_hz, int):
-            return []
+            return None
         if not is_good(self.frequency, line_hz, line_hz) or is_good(self.parameter, value, line_hz):
-            return []
+            return None
         message = f"{self.parameter} = {value:g} is out of range: {_range(self.parameter, line_hz)} at {line_hz} Hz"
-        return [Fault(message, self.parameter, "AMX4080")]
+        return Fault(message, self.parameter, "AMX4080")
 
 
 @dataclass(frozen=True)
-class OvercurrentLevel:
+class OvercurrentLevel(Rule):
     """The overcurrent level must be less than 1.8 times the largest current, both in % of the rated one (52.1.5)."""
 
     level: str
     largest: str
+    sentence = "{rule.level} must be less than 1.8 x {rule.largest}."
 
-    @property
-    def text(self) -> str:
-        """The rule as a sentence."""
-        return f"{self.level} must be less than 1.8 x {self.largest}."
-
-    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
+    def fault(self, given: Mapping[str, Given]) -> Fault | None:
         """Return the fault of two literals that do not fit together."""
         level, largest = (given[name].value if name in given else None for name in (self.level, self.largest))
         if not isinstance(level, int) or not isinstance(largest, int) or ioc_is_possible(level, largest):
-            return []
+            return None
         message = f"{self.level} = {level} is not less than {9 * largest / 5:g}, which is 1.8 x {self.largest}"
-        return [Fault(message, self.level, "AMX4185")]
+        return Fault(message, self.level, "AMX4185")
 
 
 def _range(name: str, line_hz: float) -> str:
@@ -161,61 +165,42 @@ def _range(name: str, line_hz: float) -> str:
     return f"{zero}{low:g} to {high:g}"
 
 
-def _input(
-    name: str,
-    kind: DataType,
-    text: str,
-    default: Value | None = None,
-    *,
-    required: bool = False,
-    form: Form = Form.ANY,
-    module: str = "",
-) -> Input:
-    """Return an input with its limits."""
+def _integer(name: str, text: str, default: int | None = None, **more: Any) -> Input:
     low, high = LIMITS.get(name, (None, None))
-    return Input(name, kind, name, text, required, default, form, low, high, module=module)
-
-
-def _integer(name: str, text: str, default: int | None = None, *, required: bool = False) -> Input:
-    return _input(name, DataType.INTEGER, text, default, required=required)
-
-
-def _literal(name: str, text: str, default: int | None = None, module: str = "") -> Input:
-    return _input(name, DataType.INTEGER, text, default, required=default is None, form=Form.LITERAL, module=module)
+    return Input.integer(name, name, text, default, low=low, high=high, **more)
 
 
 def _real(name: str, text: str, default: float | None = None) -> Input:
-    return _input(name, DataType.REAL, text, default, required=default is None)
+    low, high = LIMITS.get(name, (None, None))
+    return Input.real(name, name, text, default, low=low, high=high)
 
 
-def _boolean(name: str, text: str, *, default: bool = False) -> Input:
-    return _input(name, DataType.BOOLEAN, text, default)
-
-
-def _symbol(name: str, kind: DataType, text: str, default: Value | None = None, *, required: bool = False) -> Input:
-    return _input(name, kind, text, default, required=required, form=Form.VARIABLE)
+def _boolean(name: str, text: str, *, default: bool | None = False, form: Form = Form.ANY) -> Input:
+    return Input.boolean(name, name, text, default=default, form=form)
 
 
 def _shown(name: str, text: str, alias: str = "") -> Output:
-    """Return a boolean output."""
     return Output(name, DataType.BOOLEAN, name, text, required=False, holds=True, alias=alias)
 
 
 def _number(name: str, text: str) -> Output:
-    """Return an INTEGER output."""
     return Output(name, DataType.INTEGER, name, text, required=False, holds=True)
 
 
 INPUTS = (
-    _literal("IO_CNTL_SLOT", "slot of the drive I/O controller 57C406", module="57C406"),
-    _literal("DIG_IO_SLOT", "slot of the drive digital I/O module 57C408", module="57C408"),
-    _literal("AC_LINE_FREQ", "frequency of the AC line in Hz, the lowest expected one if it varies", LINE_HZ),
-    _symbol(
+    _integer("IO_CNTL_SLOT", "slot of the drive I/O controller 57C406", module="57C406", form=Form.LITERAL),
+    _integer("DIG_IO_SLOT", "slot of the drive digital I/O module 57C408", module="57C408", form=Form.LITERAL),
+    _integer(
+        "AC_LINE_FREQ",
+        "frequency of the AC line in Hz, the lowest expected one if it varies",
+        LINE_HZ,
+        form=Form.LITERAL,
+    ),
+    _integer(
         "REFERENCE",
-        DataType.INTEGER,
         "current reference, 4095 counts = LIM_BAR; plus: bridge 1, minus: bridge 2; read each scan; the block does not"
         " limit it",
-        required=True,
+        form=Form.VARIABLE,
     ),
     _real("REF_RATE", "seconds from 0 to LIM_BAR that the reference takes at least, 0.0: no limit; read in run", 0.0),
     _real("REF_LAG", "break frequency of the reference's lag in rad/s; fixed", 200.0),
@@ -223,27 +208,35 @@ INPUTS = (
     _real("PI_W_LEAD", "lead break frequency of the P+I in rad/s; fixed"),
     _integer("AG_FACTOR", "largest integral gain over that of continuous conduction, 1: not adaptive; fixed", 1),
     _integer("CC_THRESH", "threshold of continuous conduction of the adaptive gain", 0),
-    _symbol("CML_RUN", DataType.BOOLEAN, "TRUE runs the loop, FALSE stops it; read each tick", required=True),
-    _symbol("CML_COAST_STOP", DataType.BOOLEAN, "TRUE: coast stop; read in run", default=False),
+    _boolean("CML_RUN", "TRUE runs the loop, FALSE stops it; read each tick", default=None, form=Form.VARIABLE),
+    _boolean("CML_COAST_STOP", "TRUE: coast stop; read in run", form=Form.VARIABLE),
     _boolean("MCR_SELECT", "FALSE: FMCR, TRUE: RMCR; read as CML_RUN rises"),
     _real("MAX_M_DROPOUT", "longest time in s from the stop to the opening of the M-contactor; fixed", 0.1),
     _boolean("CML_TEST", "TRUE: test mode, open loop at TEST_ALPHA; read in standby"),
     _boolean("TEST_BRPOL", "bridge in test mode, FALSE: 1, TRUE: 2; read in standby"),
     _integer("TEST_ALPHA", "firing angle in test mode in degrees; read in run", 180),
-    _integer("IOC_THRESH", "instantaneous overcurrent in % of the rated current; fixed", required=True),
-    _integer("LIM_BAR", "largest current in % of the rated current; fixed", required=True),
-    _boolean(
-        "DIGITAL_TACH",
-        "TRUE: digital tachometer; the hardware watches its speed; fixed",
-        default=True,
+    _integer("IOC_THRESH", "instantaneous overcurrent in % of the rated current; fixed"),
+    _integer("LIM_BAR", "largest current in % of the rated current; fixed"),
+    _boolean("DIGITAL_TACH", "TRUE: digital tachometer; the hardware watches its speed; fixed", default=True),
+    Input(
+        "SPEED_FDBK",
+        DataType.INTEGER,
+        "SPEED_FDBK",
+        "speed for the tach loss fault, 4095 = 100 %; cannot be forced",
+        form=Form.VARIABLE,
     ),
-    _symbol("SPEED_FDBK", DataType.INTEGER, "speed for the tach loss fault, 4095 = 100 %; cannot be forced"),
     _boolean("TACH_LOSS_STOP", "TRUE: tach loss stops the drive, FALSE: it is shown alone; fixed", default=True),
-    _symbol("OSV_FDBK", DataType.INTEGER, "speed or voltage for the overspeed fault; cannot be forced"),
+    Input(
+        "OSV_FDBK",
+        DataType.INTEGER,
+        "OSV_FDBK",
+        "speed or voltage for the overspeed fault; cannot be forced",
+        form=Form.VARIABLE,
+    ),
     _integer("OSV_THRESH", "OSV_FDBK above it is overspeed or overvoltage; fixed", 0),
     _boolean("NONSTAND_PHROT", "phase rotation, FALSE: standard, C, B, A; TRUE: A, B, C"),
     _boolean("AUTO_PHROT", "TRUE: take whatever phase rotation there is; fixed"),
-    _symbol("FAULT_RESET", DataType.BOOLEAN, "TRUE resets drive faults; read in standby", required=True),
+    _boolean("FAULT_RESET", "TRUE resets drive faults; read in standby", default=None, form=Form.VARIABLE),
 )
 OUTPUTS = (
     _shown("DC_CML_STATE", "TRUE: run, FALSE: standby"),

@@ -71,7 +71,6 @@ def _place_holder(item: Input | Output) -> str:
 
 
 def _literal(value: Value) -> str:
-    """Return a value as the source text writes it."""
     return str(value).upper() if isinstance(value, bool) else str(value)
 
 

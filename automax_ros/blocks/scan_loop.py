@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from automax_ros.blocks.declare.declaration import Block, Form, Input, Platform, Special, Time, Times
 from automax_ros.core.ticks import MAX_TICKS
-from automax_ros.core.types import DataType
 
 SCAN_LOOP = Block(
     name="SCAN_LOOP",
@@ -12,12 +11,10 @@ SCAN_LOOP = Block(
     title="Scan loop",
     function="Runs the task every TICKS x tick rate, or on EVENT, and latches its simple common variables",
     inputs=(
-        Input(
+        Input.integer(
             "TICKS",
-            DataType.INTEGER,
             "TICKS",
             "ticks from scan to scan, also where EVENT starts the scan; at most 20 on a UDC",
-            required=True,
             form=Form.LITERAL,
             low=1,
             high=MAX_TICKS,

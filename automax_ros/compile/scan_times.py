@@ -18,7 +18,6 @@ from automax_ros.compile.lowering.statements import GOSUB_DEPTH
 from automax_ros.compile.paths import NOTHING, Span, longest_turn, ways_out
 from automax_ros.language.checks.rules.constant_values import constant_value
 from automax_ros.language.program import Program
-from automax_ros.language.tree.basic_tree import StartEvery
 from automax_ros.language.tree.tree import (
     Call,
     End,
@@ -29,6 +28,7 @@ from automax_ros.language.tree.tree import (
     IntegerLiteral,
     OnJump,
     Return,
+    StartEvery,
     Statement,
     Stop,
 )

@@ -10,60 +10,12 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+from automax_ros.language.parse.declarations import TUNING_KEYS
 from automax_ros.language.parse.expressions import LEVELS, NOT_LEVEL
 from automax_ros.language.text.constants import REAL_DIGITS
-from automax_ros.language.tree.basic_tree import (
-    ITEM_TYPES,
-    Close,
-    Delay,
-    Get,
-    InputFile,
-    OpenChannel,
-    OpenPort,
-    PrintFile,
-    Put,
-    StartEvery,
-    WaitOn,
-)
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.functions import FUNCTIONS
-from automax_ros.language.tree.tree import (
-    Argument,
-    Assignment,
-    Binary,
-    BooleanLiteral,
-    Call,
-    ClearErrorLog,
-    Data,
-    Declaration,
-    Declared,
-    Element,
-    End,
-    Event,
-    Expression,
-    For,
-    FunctionCall,
-    Gosub,
-    Goto,
-    If,
-    IntegerLiteral,
-    IoWrite,
-    Label,
-    Module,
-    OnJump,
-    Print,
-    Read,
-    RealLiteral,
-    Reference,
-    Remark,
-    Restore,
-    Return,
-    SetEvent,
-    Statement,
-    Stop,
-    StringLiteral,
-    Tuning,
-    Unary,
-)
+from automax_ros.language.tree.walk import statements_in_order
 
 _SIGN_LEVEL = max(LEVELS.values()) + 1
 _PRIMARY_LEVEL = _SIGN_LEVEL + 1
@@ -75,21 +27,21 @@ _LAST_NUMBER = 32767
 _STEP = 10
 
 
-def print_expression(expression: Expression) -> str:
+def print_expression(expression: tree.Expression) -> str:
     """Return an expression as text; raises ValueError for a string with both kinds of quotes."""
-    if isinstance(expression, Binary):
+    if isinstance(expression, tree.Binary):
         level = LEVELS[expression.operator]
         left, right = _operand(expression.left, level), _operand(expression.right, level + 1)
         return f"{left} {expression.operator} {right}"
-    if isinstance(expression, Unary):
+    if isinstance(expression, tree.Unary):
         if expression.operator == "NOT":
             return f"NOT {_operand(expression.operand, NOT_LEVEL + 1)}"
         return f"{expression.operator}{_operand(expression.operand, _PRIMARY_LEVEL)}"
-    if isinstance(expression, Reference):
+    if isinstance(expression, tree.Reference):
         return expression.name
-    if isinstance(expression, Element):
+    if isinstance(expression, tree.Element):
         return f"{expression.name}({_list(expression.subscripts)})"
-    if isinstance(expression, FunctionCall):
+    if isinstance(expression, tree.FunctionCall):
         function = FUNCTIONS.get(expression.name)
         if not expression.arguments and function is not None and not function.arguments:
             return expression.name
@@ -97,86 +49,42 @@ def print_expression(expression: Expression) -> str:
     return _literal(expression)
 
 
-def print_simple(statement: Statement) -> str:
+def print_simple(statement: tree.Statement) -> str:
     """Return a statement other than IF and FOR as text, without its number.
 
     Raises ValueError for a string or a remark that cannot be written in the language.
     """
-    if isinstance(statement, Declaration):
-        return f"{statement.scope.value} {', '.join(_declared(item) for item in statement.variables)}"
-    if isinstance(statement, Assignment):
-        return f"{print_expression(statement.target)} = {print_expression(statement.value)}"
-    if isinstance(statement, (Goto, Gosub)):
-        return f"{'GOTO' if isinstance(statement, Goto) else 'GOSUB'} {statement.line}"
-    if isinstance(statement, OnJump):
-        word = "GOSUB" if statement.gosub else "GOTO"
-        return f"ON {print_expression(statement.selector)} {word} {', '.join(str(line) for line in statement.lines)}"
-    if isinstance(statement, Read):
-        return f"READ {_list(statement.targets)}"
-    if isinstance(statement, Data):
-        return f"DATA {_list(statement.values)}"
-    if isinstance(statement, Restore):
-        return "RESTORE" if statement.line is None else f"RESTORE {statement.line}"
-    if isinstance(statement, Print):
-        return _print(statement)
-    if isinstance(statement, Call):
-        return f"CALL {statement.block}({', '.join(print_argument(item) for item in statement.arguments)})"
-    return _rest(statement)
+    return _SIMPLE[type(statement)](statement)
 
 
-def print_argument(argument: Argument) -> str:
+def print_argument(argument: tree.Argument) -> str:
     """Return a parameter of a CALL as text."""
     return f"{argument.keyword} = {print_expression(argument.value)}"
 
 
-def _rest(statement: Statement) -> str:
-    if isinstance(statement, Event):
-        return _event(statement)
-    if isinstance(statement, IoWrite):
-        return f"IOWRITE {_list((statement.slot, statement.register, statement.value))}"
-    if isinstance(statement, Remark):
-        return _remark(statement)
-    if isinstance(statement, SetEvent):
-        return f"SET {statement.event}"
-    waiting = _WAITING.get(type(statement))
-    if waiting is not None:
-        return waiting(statement)
-    words: dict[type[object], str] = {
-        Return: "RETURN",
-        Stop: "STOP",
-        End: "END",
-        ClearErrorLog: "CLR_ERRLOG",
-        Label: "",
-    }
-    return words[type(statement)]
-
-
-def _operand(expression: Expression, level: int) -> str:
+def _operand(expression: tree.Expression, level: int) -> str:
+    own = _PRIMARY_LEVEL
+    if isinstance(expression, tree.Binary):
+        own = LEVELS[expression.operator]
+    elif isinstance(expression, tree.Unary):
+        own = NOT_LEVEL if expression.operator == "NOT" else _SIGN_LEVEL
     text = print_expression(expression)
-    return text if _level(expression) >= level else f"({text})"
+    return text if own >= level else f"({text})"
 
 
-def _level(expression: Expression) -> int:
-    if isinstance(expression, Binary):
-        return LEVELS[expression.operator]
-    if isinstance(expression, Unary):
-        return NOT_LEVEL if expression.operator == "NOT" else _SIGN_LEVEL
-    return _PRIMARY_LEVEL
-
-
-def _list(items: tuple[Expression, ...]) -> str:
+def _list(items: tuple[tree.Expression, ...]) -> str:
     return ", ".join(print_expression(item) for item in items)
 
 
-def _literal(literal: IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral) -> str:
-    if isinstance(literal, BooleanLiteral):
+def _literal(literal: tree.IntegerLiteral | tree.RealLiteral | tree.StringLiteral | tree.BooleanLiteral) -> str:
+    if isinstance(literal, tree.BooleanLiteral):
         return "TRUE" if literal.value else "FALSE"
-    if isinstance(literal, StringLiteral):
+    if isinstance(literal, tree.StringLiteral):
         quote = "'" if '"' in literal.value else '"'
         if quote in literal.value:
             raise ValueError("a string constant cannot hold both kinds of quotes")
         return f"{quote}{literal.value}{quote}"
-    if isinstance(literal, RealLiteral):
+    if isinstance(literal, tree.RealLiteral):
         return literal.text or _real(literal.value)
     if literal.hexadecimal:
         digits = f"{literal.value % 2**32:X}"
@@ -192,38 +100,42 @@ def _real(value: float) -> str:
     return f"{text}.0" if len(text.lstrip("-")) < REAL_DIGITS else f"{text}."
 
 
-def _declared(item: Declared) -> str:
-    length = "" if item.length is None else f":{item.length}"
-    subscripts = f"({', '.join(str(count) for count in item.subscripts)})" if item.subscripts else ""
-    tuning = "" if item.tuning is None else f" [{_tuning(item.tuning)}]"
-    return f"{item.name}{length}{subscripts}{tuning}"
+def _declared(item: tree.Declared) -> str:
+    text = item.name if item.length is None else f"{item.name}:{item.length}"
+    if item.subscripts:
+        text += f"({_numbers(item.subscripts)})"
+    if item.tuning is None:
+        return text
+    keys = {key: getattr(item.tuning, key.lower()) for key in TUNING_KEYS}
+    given = ", ".join(f"{key}={print_expression(value)}" for key, value in keys.items() if value is not None)
+    return f"{text} [{given}]"
 
 
-def _tuning(tuning: Tuning) -> str:
-    keys = (("CURRENT", tuning.current), ("HIGH", tuning.high), ("LOW", tuning.low), ("STEP", tuning.step))
-    return ", ".join(f"{key}={print_expression(value)}" for key, value in keys if value is not None)
+def _numbers(numbers: tuple[int, ...]) -> str:
+    return ", ".join(str(number) for number in numbers)
 
 
-def _print(statement: Print) -> str:
-    return " ".join(["PRINT", *_printed(statement)])
+def _on_jump(statement: tree.OnJump) -> str:
+    word = "GOSUB" if statement.gosub else "GOTO"
+    return f"ON {print_expression(statement.selector)} {word} {_numbers(statement.lines)}"
 
 
-def _printed(statement: Print | PrintFile) -> list[str]:
+def _items(statement: tree.Print | tree.PrintFile) -> str:
     parts = []
     for index, item in enumerate(statement.items):
         separator = statement.separators[index] if index < len(statement.separators) else ""
         parts.append(print_expression(item) + separator)
-    return parts
+    return " ".join(parts)
 
 
-def _event(event: Event) -> str:
+def _event(event: tree.Event) -> str:
     text = f"EVENT NAME = {event.name}"
     if event.interrupt_status is not None:
         text += f", INTERRUPT_STATUS = {event.interrupt_status.name}"
     return text if event.timeout is None else f"{text}, TIMEOUT = {event.timeout}"
 
 
-def _remark(remark: Remark) -> str:
+def _remark(remark: tree.Remark) -> str:
     lines = remark.text.split("\n")
     if any(line.endswith("&") or "\r" in line for line in lines):
         raise ValueError("a line of a remark cannot end with `&` or hold a carriage return")
@@ -232,86 +144,79 @@ def _remark(remark: Remark) -> str:
     return f"{mark} {text}" if text else mark
 
 
-def _wait(statement: WaitOn) -> str:
-    return f"WAIT ON {statement.event}"
+def _time(word: str, statement: tree.Delay | tree.StartEvery) -> str:
+    return f"{word} {print_expression(statement.count)} {statement.unit.value}"
 
 
-def _delay(statement: Delay) -> str:
-    return f"DELAY {print_expression(statement.count)} {statement.unit.value}"
-
-
-def _start_every(statement: StartEvery) -> str:
-    return f"START EVERY {print_expression(statement.count)} {statement.unit.value}"
-
-
-def _open_channel(statement: OpenChannel) -> str:
-    letters = {kind: letter for letter, kind in ITEM_TYPES.items()}
+def _open_channel(statement: tree.OpenChannel) -> str:
+    letters = {kind: letter for letter, kind in tree.ITEM_TYPES.items()}
     types = ", ".join(letters[kind] for kind in statement.types)
     text = f"OPEN CHANNEL FOR {statement.direction.value} AS FILE #{statement.file}, TYPE = ({types})"
     return text if statement.depth is None else f"{text}, DEPTH = {print_expression(statement.depth)}"
 
 
-def _open_port(statement: OpenPort) -> str:
-    text = f"OPEN {_literal(StringLiteral(statement.port))} AS FILE #{statement.file}"
+def _open_port(statement: tree.OpenPort) -> str:
+    text = f"OPEN {_literal(tree.StringLiteral(statement.port))} AS FILE #{statement.file}"
     if statement.setup is None:
         return f"{text}, ACCESS = {statement.access}"
     text += f", SETUP = {print_expression(statement.setup)}"
     return text if statement.baud is None else f"{text}, {print_expression(statement.baud)}"
 
 
-def _close(statement: Close) -> str:
-    return f"CLOSE #{statement.file}"
+def _file(word: str, number: int, items: str, branch: str = "", line: int | None = None) -> str:
+    """Return a statement of a channel or port; ``branch`` is the key before its ``line``."""
+    head = word if line is None else f"{word}:{branch}={line}"
+    return f"{head} #{number}, {items}" if items else f"{head} #{number}"
 
 
-def _branch(key: str, line: int | None) -> str:
-    return "" if line is None else f":{key}={line}"
-
-
-def _input(statement: InputFile) -> str:
-    return f"INPUT{_branch('EMPTY', statement.empty)} #{statement.file}, {_list(statement.targets)}"
-
-
-def _print_file(statement: PrintFile) -> str:
-    head = f"PRINT{_branch('FULL', statement.full)} #{statement.file}"
-    return f"{head}, {' '.join(_printed(statement))}" if statement.items else head
-
-
-def _get(statement: Get) -> str:
-    return f"GET{_branch('EMPTY', statement.empty)} #{statement.file}, {print_expression(statement.target)}"
-
-
-def _put(statement: Put) -> str:
-    return f"PUT #{statement.file}, {print_expression(statement.item)}"
-
-
-_WAITING: dict[type[object], Callable[[Any], str]] = {
-    WaitOn: _wait,
-    Delay: _delay,
-    StartEvery: _start_every,
-    OpenChannel: _open_channel,
-    OpenPort: _open_port,
-    Close: _close,
-    InputFile: _input,
-    PrintFile: _print_file,
-    Get: _get,
-    Put: _put,
+_SIMPLE: dict[type[tree.Statement], Callable[[Any], str]] = {
+    tree.Declaration: lambda it: f"{it.scope.value} {', '.join(_declared(item) for item in it.variables)}",
+    tree.Assignment: lambda it: f"{print_expression(it.target)} = {print_expression(it.value)}",
+    tree.Goto: lambda it: f"GOTO {it.line}",
+    tree.Gosub: lambda it: f"GOSUB {it.line}",
+    tree.Return: lambda _: "RETURN",
+    tree.OnJump: _on_jump,
+    tree.Read: lambda it: f"READ {_list(it.targets)}",
+    tree.Data: lambda it: f"DATA {_list(it.values)}",
+    tree.Restore: lambda it: "RESTORE" if it.line is None else f"RESTORE {it.line}",
+    tree.Print: lambda it: f"PRINT {_items(it)}".rstrip(),
+    tree.Stop: lambda _: "STOP",
+    tree.Event: _event,
+    tree.Call: lambda it: f"CALL {it.block}({', '.join(print_argument(item) for item in it.arguments)})",
+    tree.IoWrite: lambda it: f"IOWRITE {_list((it.slot, it.register, it.value))}",
+    tree.ClearErrorLog: lambda _: "CLR_ERRLOG",
+    tree.End: lambda _: "END",
+    tree.Remark: _remark,
+    tree.Label: lambda _: "",
+    tree.SetEvent: lambda it: f"SET {it.event}",
+    tree.WaitOn: lambda it: f"WAIT ON {it.event}",
+    tree.Delay: lambda it: _time("DELAY", it),
+    tree.StartEvery: lambda it: _time("START EVERY", it),
+    tree.OpenChannel: _open_channel,
+    tree.OpenPort: _open_port,
+    tree.Close: lambda it: _file("CLOSE", it.file, ""),
+    tree.InputFile: lambda it: _file("INPUT", it.file, _list(it.targets), "EMPTY", it.empty),
+    tree.PrintFile: lambda it: _file("PRINT", it.file, _items(it), "FULL", it.full),
+    tree.Get: lambda it: _file("GET", it.file, print_expression(it.target), "EMPTY", it.empty),
+    tree.Put: lambda it: _file("PUT", it.file, print_expression(it.item)),
 }
+"""The printed form of each statement but IF and FOR."""
 
 
-def print_module(module: Module) -> str:
+def print_module(module: tree.Module) -> str:
     """Return the text of a task.
 
     A tree in which no statement has a number is numbered first. Raises ValueError for a tree that has no text, such as
     one with a statement without a number after a remark.
     """
-    if not _numbers(module.statements):
+    if not any(statement.number is not None for statement, _ in statements_in_order(module.statements)):
         module = numbered(module)
     writer = _Writer()
     writer.statements(module.statements)
     return writer.text()
 
 
-def numbered(module: Module) -> Module:
+def numbered(module: tree.Module) -> tree.Module:
     """Return the tree with every statement on a separate line, numbered in tens (closer in long tasks).
 
     ELSE, END_IF and NEXT get numbers as well, as labels. Raises ValueError above 32767 statements.
@@ -320,51 +225,37 @@ def numbered(module: Module) -> Module:
     step = min(_STEP, _LAST_NUMBER // max(count, 1))
     if step == 0:
         raise ValueError(f"{count} lines are more than there are line numbers")
-    return Module(_Numbering(step).statements(module.statements)[0])
-
-
-def _numbers(statements: tuple[Statement, ...]) -> list[int]:
-    found = []
-    for statement in statements:
-        if statement.number is not None:
-            found.append(statement.number)
-        if isinstance(statement, If):
-            found += _numbers(statement.then) + _numbers(statement.otherwise)
-        elif isinstance(statement, For):
-            found += _numbers(statement.body)
-    return found
+    return tree.Module(_Numbering(step).statements(module.statements)[0])
 
 
 class _Numbering:
-    """Assigns line numbers in order."""
-
     def __init__(self, step: int) -> None:
         self._step = step
         self._count = 0
 
     def statements(
-        self, statements: tuple[Statement, ...], count_only: bool = False
-    ) -> tuple[tuple[Statement, ...], int]:
+        self, statements: tuple[tree.Statement, ...], count_only: bool = False
+    ) -> tuple[tuple[tree.Statement, ...], int]:
         """Return the statements with numbers, and the count of numbers assigned."""
-        result: list[Statement] = []
+        result: list[tree.Statement] = []
         for statement in statements:
-            if isinstance(statement, Label):
+            if isinstance(statement, tree.Label):
                 continue
             result.extend(self._statement(statement))
         return (() if count_only else tuple(result)), self._count
 
-    def _statement(self, statement: Statement) -> list[Statement]:
+    def _statement(self, statement: tree.Statement) -> list[tree.Statement]:
         first = dataclasses.replace(statement, number=self._next())
-        if isinstance(first, For):
+        if isinstance(first, tree.For):
             body = self.statements(first.body)[0]
-            return [dataclasses.replace(first, body=(*body, Label(number=self._next())))]
-        if isinstance(first, If) and not first.one_line:
+            return [dataclasses.replace(first, body=(*body, tree.Label(number=self._next())))]
+        if isinstance(first, tree.If) and not first.one_line:
             then = self.statements(first.then)[0]
             otherwise = first.otherwise
             if otherwise:
-                then = (*then, Label(number=self._next()))
+                then = (*then, tree.Label(number=self._next()))
                 otherwise = self.statements(otherwise)[0]
-            return [dataclasses.replace(first, then=then, otherwise=otherwise), Label(number=self._next())]
+            return [dataclasses.replace(first, then=then, otherwise=otherwise), tree.Label(number=self._next())]
         return [first]
 
     def _next(self) -> int:
@@ -377,33 +268,33 @@ class _Writer:
 
     def __init__(self) -> None:
         self._lines: list[str] = []
-        self._last: Statement | None = None
+        self._last: tree.Statement | None = None
         self._indent = 0
 
     def text(self) -> str:
         return "".join(f"{line}\n" for line in self._lines)
 
-    def statements(self, statements: tuple[Statement, ...]) -> None:
+    def statements(self, statements: tuple[tree.Statement, ...]) -> None:
         """Write statements; the label after a block IF is the number of its END_IF."""
         index = 0
         while index < len(statements):
             statement = statements[index]
             index += 1
-            if isinstance(statement, If) and not statement.one_line:
+            if isinstance(statement, tree.If) and not statement.one_line:
                 label = statements[index] if index < len(statements) else None
-                ends = isinstance(label, Label)
+                ends = isinstance(label, tree.Label)
                 self._block_if(statement, label.number if label is not None and ends else None)
                 index += ends
-            elif isinstance(statement, For):
+            elif isinstance(statement, tree.For):
                 self._for(statement)
-            elif isinstance(statement, If):
+            elif isinstance(statement, tree.If):
                 self._emit(statement.number, self._one_line(statement), statement)
-            elif isinstance(statement, Call):
+            elif isinstance(statement, tree.Call):
                 self._call(statement)
             else:
                 self._emit(statement.number, print_simple(statement), statement)
 
-    def _emit(self, number: int | None, text: str, statement: Statement | None) -> None:
+    def _emit(self, number: int | None, text: str, statement: tree.Statement | None) -> None:
         if number is not None:
             self._lines.append(f"{number} {'  ' * self._indent}{text}".rstrip(" "))
         else:
@@ -411,15 +302,15 @@ class _Writer:
             self._lines[-1] += f" \\ {text}"
         self._last = statement
 
-    def _check_same_line(self, statement: Statement | None) -> None:
+    def _check_same_line(self, statement: tree.Statement | None) -> None:
         if not self._lines:
             raise ValueError("the first statement has no line number")
-        if isinstance(self._last, (Remark, Label)):
+        if isinstance(self._last, (tree.Remark, tree.Label)):
             raise ValueError("a statement after a remark or a bare number needs a line number")
-        if isinstance(self._last, If) and self._last.one_line and not isinstance(statement, Remark):
+        if isinstance(self._last, tree.If) and self._last.one_line and not isinstance(statement, tree.Remark):
             raise ValueError("a statement after a one-line IF needs a line number")
 
-    def _call(self, statement: Call) -> None:
+    def _call(self, statement: tree.Call) -> None:
         text = print_simple(statement)
         if len(text) <= LINE_WIDTH or len(statement.arguments) < 2:
             self._emit(statement.number, text, statement)
@@ -430,7 +321,7 @@ class _Writer:
         self._lines.extend(f"{margin}{argument}, &" for argument in arguments[1:-1])
         self._lines.append(f"{margin}{arguments[-1]})")
 
-    def _for(self, statement: For) -> None:
+    def _for(self, statement: tree.For) -> None:
         step = "" if statement.step is None else f" STEP {print_expression(statement.step)}"
         first, last = print_expression(statement.start), print_expression(statement.stop)
         name = statement.variable.name
@@ -439,7 +330,7 @@ class _Writer:
         self._inner(body)
         self._emit(number, f"NEXT {name}", None)
 
-    def _block_if(self, statement: If, end: int | None) -> None:
+    def _block_if(self, statement: tree.If, end: int | None) -> None:
         self._emit(statement.number, f"IF {print_expression(statement.condition)} THEN", None)
         number, then = _split_label(statement.then)
         self._inner(then)
@@ -448,12 +339,12 @@ class _Writer:
             self._inner(statement.otherwise)
         self._emit(end, "END_IF", None)
 
-    def _inner(self, statements: tuple[Statement, ...]) -> None:
+    def _inner(self, statements: tuple[tree.Statement, ...]) -> None:
         self._indent += 1
         self.statements(statements)
         self._indent -= 1
 
-    def _one_line(self, statement: If) -> str:
+    def _one_line(self, statement: tree.If) -> str:
         if not statement.then:
             raise ValueError("a one-line IF needs a statement after THEN")
         text = f"IF {print_expression(statement.condition)} THEN {self._branch(statement.then)}"
@@ -463,36 +354,40 @@ class _Writer:
             raise ValueError("ELSE would belong to the inner IF of a one-line IF")
         return f"{text} ELSE {self._branch(statement.otherwise)}"
 
-    def _branch(self, statements: tuple[Statement, ...]) -> str:
+    def _branch(self, statements: tuple[tree.Statement, ...]) -> str:
         parts = []
         for index, statement in enumerate(statements):
-            if isinstance(statement, (Remark, Label, For)) or (isinstance(statement, If) and not statement.one_line):
+            if isinstance(statement, (tree.Remark, tree.Label, tree.For)) or _is_block_if(statement):
                 raise ValueError(f"a one-line IF cannot hold a {type(statement).__name__}")
-            if isinstance(statement, If):
+            if isinstance(statement, tree.If):
                 if index < len(statements) - 1:
                     raise ValueError("an IF inside a one-line IF must be its last statement")
                 parts.append(self._one_line(statement))
-            elif index == 0 and isinstance(statement, Goto):
+            elif index == 0 and isinstance(statement, tree.Goto):
                 parts.append(str(statement.line))
             else:
                 parts.append(print_simple(statement))
         return " \\ ".join(parts)
 
 
-def _takes_else(statement: Statement) -> bool:
+def _is_block_if(statement: tree.Statement) -> bool:
+    return isinstance(statement, tree.If) and not statement.one_line
+
+
+def _takes_else(statement: tree.Statement) -> bool:
     """Return whether a following ELSE would belong to this statement."""
-    while isinstance(statement, If):
+    while isinstance(statement, tree.If):
         if not statement.otherwise:
             return True
         statement = statement.otherwise[-1]
     return False
 
 
-def _split_label(statements: tuple[Statement, ...]) -> tuple[int | None, tuple[Statement, ...]]:
+def _split_label(statements: tuple[tree.Statement, ...]) -> tuple[int | None, tuple[tree.Statement, ...]]:
     """Return the number of the label at the end, and the rest; the label after a block IF is that of its END_IF."""
-    if not statements or not isinstance(statements[-1], Label):
+    if not statements or not isinstance(statements[-1], tree.Label):
         return None, statements
     before = statements[-2] if len(statements) > 1 else None
-    if isinstance(before, If) and not before.one_line:
+    if isinstance(before, tree.If) and not before.one_line:
         return None, statements
     return statements[-1].number, statements[:-1]

@@ -12,20 +12,8 @@ from automax_ros.blocks.declare.declaration import Block
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
-from automax_ros.language.tree.basic_tree import Direction
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.task_kind import TaskKind
-from automax_ros.language.tree.tree import (
-    BooleanLiteral,
-    Call,
-    Element,
-    Event,
-    Expression,
-    IntegerLiteral,
-    RealLiteral,
-    Reference,
-    Scope,
-    Statement,
-)
 from automax_ros.language.tree.walk import statements_in_order, targets_of
 
 Place = tuple[int, Span]
@@ -48,7 +36,7 @@ class Symbol:
 
     name: str
     type: DataType
-    scope: Scope
+    scope: tree.Scope
     span: Span
     dimensions: tuple[int, ...] = ()
     length: int = 0
@@ -65,7 +53,7 @@ class Symbol:
     @property
     def latched(self) -> bool:
         """Whether the scan latches it: a simple common INTEGER, DOUBLE INTEGER or BOOLEAN (3.3)."""
-        return self.scope is Scope.COMMON and not self.dimensions and self.type.latched
+        return self.scope is tree.Scope.COMMON and not self.dimensions and self.type.latched
 
 
 @dataclass(frozen=True)
@@ -105,16 +93,16 @@ class BoundCall:
     makes or uses; ``elements`` the number of elements of its tables, 0 without one.
     """
 
-    call: Call
+    call: tree.Call
     block: Block
     line: int
-    arguments: dict[str, Expression]
+    arguments: dict[str, tree.Expression]
     defaults: dict[str, Value]
     structure: DataStructure | None = None
     elements: int = 0
 
     @property
-    def targets(self) -> list[Expression]:
+    def targets(self) -> list[tree.Expression]:
         """The targets of the outputs: variables and array elements, in the order of the declaration."""
         return [self.arguments[output.name] for output in self.block.outputs if output.name in self.arguments]
 
@@ -123,7 +111,7 @@ class BoundCall:
         """Values that the CALL fixes for the block, by lower-case name: literals, defaults, and the ``CALL_FACTS``."""
         facts: dict[str, Value] = {name.lower(): value for name, value in self.defaults.items()}
         for name, given in self.arguments.items():
-            if isinstance(given, (IntegerLiteral, RealLiteral, BooleanLiteral)):
+            if isinstance(given, (tree.IntegerLiteral, tree.RealLiteral, tree.BooleanLiteral)):
                 facts[name.lower()] = given.value
         facts["programmed"] = programmed_channels(self.arguments)
         facts["elements"] = self.elements
@@ -138,7 +126,7 @@ class OpenedFile:
 
     number: int
     port: str = ""
-    direction: Direction | None = None
+    direction: tree.Direction | None = None
     types: tuple[DataType, ...] = ()
 
     @property
@@ -168,14 +156,14 @@ class Program:
 
     name: str
     symbols: dict[str, Symbol]
-    startup: tuple[Statement, ...]
-    scan: tuple[Statement, ...]
+    startup: tuple[tree.Statement, ...]
+    scan: tuple[tree.Statement, ...]
     ticks: int
     tick_ns: int
     calls: dict[Span, BoundCall]
     data: tuple[Value, ...] = ()
     data_lines: tuple[tuple[int, int], ...] = ()
-    events: tuple[Event, ...] = ()
+    events: tuple[tree.Event, ...] = ()
     event: str | None = None
     scan_loop_line: int = 0
     target: str = "automax"
@@ -204,12 +192,12 @@ class Program:
         return int(self.cml.facts[self.cml.block.line_scan.frequency.lower()])
 
 
-def places_that_write(program: Program, scope: Scope = Scope.COMMON) -> dict[str, list[Place]]:
+def places_that_write(program: Program, scope: tree.Scope = tree.Scope.COMMON) -> dict[str, list[Place]]:
     """Return the places at which the task can write each common (or local), in the order of the text."""
     found: dict[str, list[Place]] = {}
 
-    def note(target: Expression | None, line: int | None) -> None:
-        if not isinstance(target, (Reference, Element)) or line is None:
+    def note(target: tree.Expression | None, line: int | None) -> None:
+        if not isinstance(target, (tree.Reference, tree.Element)) or line is None:
             return
         symbol = program.symbols.get(target.name)
         if symbol is not None and symbol.scope is scope:
@@ -221,7 +209,7 @@ def places_that_write(program: Program, scope: Scope = Scope.COMMON) -> dict[str
     for statement, line in statements_in_order((*program.startup, *program.scan)):
         for target in targets_of(statement):
             note(target, line)
-        if isinstance(statement, Call) and statement.span in program.calls:
+        if isinstance(statement, tree.Call) and statement.span in program.calls:
             bound = program.calls[statement.span]
             for output in bound.block.outputs:
                 note(bound.arguments.get(output.name), bound.line)

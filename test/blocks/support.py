@@ -34,6 +34,14 @@ def filtered(numerator, denominator, c, inputs):
     return signal.lfilter(b, a, np.asarray(inputs, dtype=float))
 
 
+def changed(before, after, inputs, at=200):
+    """Filter inputs by scipy with (b, a) of ``before``, from place ``at`` on with those of ``after``: direct form I."""
+    first = signal.lfilter(*before, inputs[:at])
+    order = len(after[1]) - 1
+    state = signal.lfiltic(*after, first[: -order - 1 : -1], inputs[at - 1 : at - 1 - order : -1])
+    return np.concatenate([first, signal.lfilter(*after, inputs[at:], zi=state)[0]])
+
+
 def signals(amplitude, scans=10_000):
     """Steps, a sine and noise, whole counts up to an amplitude, without a mean that an integrator would run away on."""
     n = np.arange(scans)

@@ -71,7 +71,7 @@ ALL_PASS = Block(
     notes=("It turns the phase and leaves the gain.",),
     step=all_pass_step,
 )
-EXAMPLE = Example("ALL_PASS", "A step.", {"SIGNAL": (1000,) * 8}, ("RESULT",), {"WC": 10.0})
+EXAMPLE = Example("ALL_PASS", "A step.", {"SIGNAL": (1000,) * 8}, {"WC": 10.0}, ("RESULT",))
 
 TASK = """\
 10 LOCAL A%, B%, W

@@ -119,9 +119,9 @@ def calls(draw, block: Block) -> Programmed:
         if output.required or everything or draw(st.booleans()):
             parameters[output.name] = draw(variables(output.type))
     for rule in block.rules:
-        if any(rule.faults(seen_by_rules(parameters))):
+        if rule.fault(seen_by_rules(parameters)):
             _mend(draw, block, rule, parameters)
-    assume(not any(rule.faults(seen_by_rules(parameters)) for rule in block.rules))
+    assume(not any(rule.fault(seen_by_rules(parameters)) for rule in block.rules))
     return Programmed(block, dict(draw(st.permutations(list(parameters.items())))))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
-from automax_ros.core.diagnostics import Diagnostic, SourceText
+from automax_ros.core.diagnostics import Diagnostic, Severity, SourceText
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec, Program
 
@@ -36,6 +36,11 @@ def problems(text: str, **options: object) -> list[Diagnostic]:
 def codes(text: str, **options: object) -> list[str]:
     """The codes of the problems, in the order of the text."""
     return [item.code for item in problems(text, **options)]
+
+
+def errors_of(text: str, **options: object) -> list[str]:
+    """The codes of the errors; a UDC task without THERMAL_OVERLOAD, say, has a warning besides."""
+    return [item.code for item in problems(text, **options) if item.severity is Severity.ERROR]
 
 
 def one(text: str, **options: object) -> Diagnostic:

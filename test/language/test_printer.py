@@ -8,29 +8,12 @@ from hypothesis import HealthCheck, given, settings
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.parse.parser import parse
 from automax_ros.language.printer import LINE_WIDTH, numbered, print_expression, print_module
-from automax_ros.language.tree.tree import (
-    Assignment,
-    Declaration,
-    Declared,
-    End,
-    Expression,
-    For,
-    Goto,
-    If,
-    IntegerLiteral,
-    Label,
-    Module,
-    RealLiteral,
-    Reference,
-    Remark,
-    Scope,
-    StringLiteral,
-)
+from automax_ros.language.tree import tree
 from language.parser_support import expression_of, module_of
 from language.random_trees import DEEP_EXPRESSIONS, modules
 
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
-FLAG, ASSIGN = Reference("FLAG@"), Assignment(Reference("A%"), IntegerLiteral(1))
+FLAG, ASSIGN = tree.Reference("FLAG@"), tree.Assignment(tree.Reference("A%"), tree.IntegerLiteral(1))
 CANONICAL = """10 LOCAL A%, T%(3, 4), S$:50(2), GAIN [CURRENT=1.5, HIGH=2.0, LOW=-2.0, STEP=0.1]
 20 COMMON SPEED%, RUN@ \\ ! the line's own
 30 EVENT NAME = START, INTERRUPT_STATUS = SPEED%, TIMEOUT = 6
@@ -61,7 +44,7 @@ def test_canonical_text_prints_as_itself() -> None:
     assert print_module(module_of(CANONICAL)) == CANONICAL
 
 
-def parsed_back(module: Module) -> Module:
+def parsed_back(module: tree.Module) -> tree.Module:
     text = print_module(module)
     back, problems = parse(SourceText("TASK.BLK", text))
     assert [item for item in problems if item.code != "AMX0014"] == []
@@ -70,7 +53,7 @@ def parsed_back(module: Module) -> Module:
 
 @settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=SLOW)
 @given(modules())
-def test_printed_task_parses_back_to_an_equal_tree(module: Module) -> None:
+def test_printed_task_parses_back_to_an_equal_tree(module: tree.Module) -> None:
     back = parsed_back(module)
     assert back == module
     assert print_module(back) == print_module(module)
@@ -78,14 +61,14 @@ def test_printed_task_parses_back_to_an_equal_tree(module: Module) -> None:
 
 @settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=SLOW)
 @given(DEEP_EXPRESSIONS)
-def test_printed_expression_parses_back_to_an_equal_tree(expression: Expression) -> None:
+def test_printed_expression_parses_back_to_an_equal_tree(expression: tree.Expression) -> None:
     assert expression_of(print_expression(expression)) == expression
 
 
 @pytest.mark.soak
 @settings(max_examples=3000, deadline=None, suppress_health_check=SLOW)
 @given(modules())
-def test_many_printed_tasks_parse_back(module: Module) -> None:
+def test_many_printed_tasks_parse_back(module: tree.Module) -> None:
     assert parsed_back(module) == module
 
 
@@ -112,23 +95,29 @@ def test_only_parentheses_that_are_needed(text: str) -> None:
     ],
 )
 def test_real_constants_without_a_spelling(value: float, text: str) -> None:
-    assert print_expression(RealLiteral(value)) == text
-    assert expression_of(text) == RealLiteral(value)
+    assert print_expression(tree.RealLiteral(value)) == text
+    assert expression_of(text) == tree.RealLiteral(value)
 
 
 def test_trees_made_by_hand_get_numbers() -> None:
-    made = Module((Declaration(Scope.LOCAL, (Declared("A%"),)), If(FLAG, (ASSIGN,), (Goto(10),)), End()))
+    made = tree.Module(
+        (
+            tree.Declaration(tree.Scope.LOCAL, (tree.Declared("A%"),)),
+            tree.If(FLAG, (ASSIGN,), (tree.Goto(10),)),
+            tree.End(),
+        )
+    )
     text = "10 LOCAL A%\n20 IF FLAG@ THEN\n30   A% = 1\n40 ELSE\n50   GOTO 10\n60 END_IF\n70 END\n"
     assert print_module(made) == text
     assert module_of(text) == numbered(made)
 
 
 def test_long_tasks_are_numbered_more_closely() -> None:
-    made = numbered(Module((ASSIGN,) * 10_000))
+    made = numbered(tree.Module((ASSIGN,) * 10_000))
     numbers = [statement.number for statement in made.statements]
     assert numbers == list(range(3, 30_001, 3))
     with pytest.raises(ValueError, match="more than there are line numbers"):
-        numbered(Module((ASSIGN,) * 32_768))
+        numbered(tree.Module((ASSIGN,) * 32_768))
 
 
 def test_only_calls_that_are_too_long_are_broken() -> None:
@@ -140,18 +129,26 @@ def test_only_calls_that_are_too_long_are_broken() -> None:
 @pytest.mark.parametrize(
     "module",
     [
-        Module((ASSIGN, dataclasses.replace(ASSIGN, number=10))),
-        Module((Remark("text", True, number=10), ASSIGN)),
-        Module((Label(number=10), ASSIGN)),
-        Module((If(FLAG, (ASSIGN,), one_line=True, number=10), ASSIGN)),
-        Module((If(FLAG, (), one_line=True),)),
-        Module((If(FLAG, (If(FLAG, (ASSIGN,), one_line=True),), (ASSIGN,), one_line=True),)),
-        Module((If(FLAG, (If(FLAG, (ASSIGN,), one_line=True), ASSIGN), one_line=True),)),
-        Module((If(FLAG, (For(Reference("I%"), IntegerLiteral(1), IntegerLiteral(2), None, ()),), one_line=True),)),
-        Module((Remark("ends with &", True),)),
-        Module((Assignment(Reference("A$"), StringLiteral("both \" and '")),)),
+        tree.Module((ASSIGN, dataclasses.replace(ASSIGN, number=10))),
+        tree.Module((tree.Remark("text", True, number=10), ASSIGN)),
+        tree.Module((tree.Label(number=10), ASSIGN)),
+        tree.Module((tree.If(FLAG, (ASSIGN,), one_line=True, number=10), ASSIGN)),
+        tree.Module((tree.If(FLAG, (), one_line=True),)),
+        tree.Module((tree.If(FLAG, (tree.If(FLAG, (ASSIGN,), one_line=True),), (ASSIGN,), one_line=True),)),
+        tree.Module((tree.If(FLAG, (tree.If(FLAG, (ASSIGN,), one_line=True), ASSIGN), one_line=True),)),
+        tree.Module(
+            (
+                tree.If(
+                    FLAG,
+                    (tree.For(tree.Reference("I%"), tree.IntegerLiteral(1), tree.IntegerLiteral(2), None, ()),),
+                    one_line=True,
+                ),
+            )
+        ),
+        tree.Module((tree.Remark("ends with &", True),)),
+        tree.Module((tree.Assignment(tree.Reference("A$"), tree.StringLiteral("both \" and '")),)),
     ],
 )
-def test_trees_that_no_text_gives_are_refused(module: Module) -> None:
+def test_trees_that_no_text_gives_are_refused(module: tree.Module) -> None:
     with pytest.raises(ValueError, match=r"."):
         print_module(module)

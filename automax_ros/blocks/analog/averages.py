@@ -62,18 +62,11 @@ RUNNING_AVERAGE = Block(
     title="Running average",
     function="OUTPUT = (INPUT(n) + ... + INPUT(n - RS + 1)) / REQUIRED_SAMPLES, in every scan",
     inputs=(
-        Input(
-            "REQUIRED_SAMPLES",
-            DataType.INTEGER,
-            "RS",
-            "number of samples to average",
-            required=True,
-            form=Form.LITERAL,
-            low=1,
-            high=INT16_MAX,
+        Input.integer(
+            "REQUIRED_SAMPLES", "RS", "number of samples to average", form=Form.LITERAL, low=1, high=INT16_MAX
         ),
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE forgets all samples; OUTPUT is 0", default=False),
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE),
+        Input.boolean("RESET", "R", "TRUE forgets all samples; OUTPUT is 0", default=False),
+        Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE),
     ),
     outputs=(
         Output("DATA_VALID", DataType.BOOLEAN, "DV", "TRUE once the required samples were taken", required=False),
@@ -162,17 +155,15 @@ SAMPLED_AVERAGE = Block(
     title="Sampled average",
     function="OUTPUT = (INPUT(1) + ... + INPUT(RS)) / REQUIRED_SAMPLES, once every REQUIRED_SAMPLES scans",
     inputs=(
-        Input(
+        Input.integer(
             "REQUIRED_SAMPLES",
-            DataType.INTEGER,
             "RS",
             "number of samples to average; 0 or less counts as 1",
-            required=True,
             low=INT16_MIN,
             high=INT16_MAX,
         ),
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE),
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE forgets all samples; OUTPUT is 0", default=False),
+        Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE),
+        Input.boolean("RESET", "R", "TRUE forgets all samples; OUTPUT is 0", default=False),
     ),
     outputs=(
         Output("DATA_VALID", DataType.BOOLEAN, "DV", "TRUE in the scan that updates the others", required=False),

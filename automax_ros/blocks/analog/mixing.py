@@ -84,7 +84,7 @@ AMPLIFIER = Block(
             input_channels("INPUT", MOST_CHANNELS, DataType.INTEGER, "I", "signal input", required=1, unused=0),
             input_channels("GAIN", MOST_CHANNELS, DataType.INTEGER, "G", "gain", required=1, unused=0),
         ),
-        Input("SCALE", DataType.INTEGER, "SC", "scale factor; below 0 it inverts the output", default=DEFAULT_SCALE),
+        Input.integer("SCALE", "SC", "scale factor; below 0 it inverts the output", DEFAULT_SCALE),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the scaled sum, limited to -32768 to +32767"),),
     rules=(Contiguous(("INPUT", "GAIN"), MOST_CHANNELS),),

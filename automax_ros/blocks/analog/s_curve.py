@@ -104,26 +104,23 @@ S_CURVE = Block(
     title="S curve",
     function="OUTPUT moves toward INPUT as RAMP does, and its rate changes by at most JERK_RATE / SCALE a scan",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
-        Input("HOLD", DataType.BOOLEAN, "H", "TRUE brings the rate down to 0 at the jerk rate", default=False),
-        Input("ACCEL_RATE", DataType.INTEGER, "AR", "rate upward in counts/scan, its magnitude", default=INT16_MAX),
-        Input("DECEL_RATE", DataType.INTEGER, "DR", "rate downward in counts/scan, its magnitude", default=INT16_MAX),
-        Input(
-            "JERK_RATE", DataType.INTEGER, "JR", "change of rate in counts/scan**2, its magnitude", default=INT16_MAX
-        ),
-        Input(
+        Input.integer("INPUT", "I", "signal input"),
+        Input.boolean("RESET", "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+        Input.boolean("HOLD", "H", "TRUE brings the rate down to 0 at the jerk rate", default=False),
+        Input.integer("ACCEL_RATE", "AR", "rate upward in counts/scan, its magnitude", INT16_MAX),
+        Input.integer("DECEL_RATE", "DR", "rate downward in counts/scan, its magnitude", INT16_MAX),
+        Input.integer("JERK_RATE", "JR", "change of rate in counts/scan**2, its magnitude", INT16_MAX),
+        Input.integer(
             "SCALE",
-            DataType.INTEGER,
             "SC",
             "divides the rates and the jerk rate: with scans per second here the rates are in counts/s",
-            default=1,
+            1,
             form=Form.LITERAL,
             low=1,
             high=INT16_MAX,
         ),
-        Input("REVERSE", DataType.BOOLEAN, "REV", "TRUE exchanges ACCEL_RATE and DECEL_RATE", default=False),
-        Input("INITIAL_VALUE", DataType.INTEGER, "IV", "the output while RESET is TRUE", default=0),
+        Input.boolean("REVERSE", "REV", "TRUE exchanges ACCEL_RATE and DECEL_RATE", default=False),
+        Input.integer("INITIAL_VALUE", "IV", "the output while RESET is TRUE", 0),
     ),
     outputs=(
         Output("OUTPUT", DataType.INTEGER, "O", "the curve"),

@@ -25,9 +25,9 @@ LIMIT = Block(
     title="Limit",
     function="OUTPUT = INPUT, held between LIMIT_MINUS and LIMIT_PLUS",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE),
-        Input("LIMIT_PLUS", DataType.INTEGER, "LP", "upper limit", default=INT16_MAX),
-        Input("LIMIT_MINUS", DataType.INTEGER, "LM", "lower limit", default=INT16_MIN),
+        Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE),
+        Input.integer("LIMIT_PLUS", "LP", "upper limit", INT16_MAX),
+        Input.integer("LIMIT_MINUS", "LM", "lower limit", INT16_MIN),
     ),
     outputs=(
         Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
@@ -85,14 +85,12 @@ SCALE = Block(
     title="Scale",
     function="OUTPUT = (INPUT - INPUT_MIN) * (OUTPUT_IMAX - OUTPUT_IMIN) / (INPUT_MAX - INPUT_MIN) + OUTPUT_IMIN",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE),
-        Input(
-            "CLAMP", DataType.BOOLEAN, "CL", "TRUE clamps the value of INPUT to INPUT_MIN and INPUT_MAX", default=False
-        ),
-        Input("INPUT_MAX", DataType.INTEGER, "IMX", "input at which OUTPUT is OUTPUT_IMAX", required=True),
-        Input("INPUT_MIN", DataType.INTEGER, "IMN", "input at which OUTPUT is OUTPUT_IMIN", required=True),
-        Input("OUTPUT_IMAX", DataType.INTEGER, "OIMX", "output when INPUT equals INPUT_MAX", required=True),
-        Input("OUTPUT_IMIN", DataType.INTEGER, "OIMN", "output when INPUT equals INPUT_MIN", required=True),
+        Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE),
+        Input.boolean("CLAMP", "CL", "TRUE clamps the value of INPUT to INPUT_MIN and INPUT_MAX", default=False),
+        Input.integer("INPUT_MAX", "IMX", "input at which OUTPUT is OUTPUT_IMAX"),
+        Input.integer("INPUT_MIN", "IMN", "input at which OUTPUT is OUTPUT_IMIN"),
+        Input.integer("OUTPUT_IMAX", "OIMX", "output when INPUT equals INPUT_MAX"),
+        Input.integer("OUTPUT_IMIN", "OIMN", "output when INPUT equals INPUT_MIN"),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the scaled signal, limited to -32768 to +32767"),),
     logs=("AMX7001", "AMX7003"),
@@ -117,9 +115,9 @@ SWITCH = Block(
     title="Switch",
     function="OUTPUT = INPUT1 if SELECT, else INPUT2",
     inputs=(
-        Input("INPUT1", DataType.INTEGER, "I1", "signal passed while SELECT is TRUE", required=True),
-        Input("INPUT2", DataType.INTEGER, "I2", "signal passed while SELECT is FALSE", required=True),
-        Input("SELECT", DataType.BOOLEAN, "SE", "signal select", required=True),
+        Input.integer("INPUT1", "I1", "signal passed while SELECT is TRUE"),
+        Input.integer("INPUT2", "I2", "signal passed while SELECT is FALSE"),
+        Input.boolean("SELECT", "SE", "signal select"),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the selected signal"),),
     times=Times(Time(11.52), Time(47.0), Time(12.55), Time(8.08)),
@@ -128,15 +126,7 @@ SWITCH = Block(
 
 
 def move_step(
-    enable: bool,
-    input1: int,
-    input2: int,
-    input3: int,
-    input4: int,
-    input5: int,
-    input6: int,
-    input7: int,
-    input8: int,
+    enable: bool, input1: int, input2: int, input3: int, input4: int, input5: int, input6: int, input7: int, input8: int
 ) -> tuple[int, int, int, int, int, int, int, int, bool]:
     """Pass the inputs on while enabled; otherwise the output variables keep their values, whatever wrote them (17)."""
     output1 = input1
@@ -157,7 +147,7 @@ MOVE = Block(
     title="Move",
     function="OUTPUT1 = INPUT1, ... OUTPUTn = INPUTn if ENABLE, else unchanged",
     inputs=(
-        Input("ENABLE", DataType.BOOLEAN, "EN", "FALSE leaves all outputs as they are", default=True),
+        Input.boolean("ENABLE", "EN", "FALSE leaves all outputs as they are", default=True),
         *input_channels("INPUT", MOST_CHANNELS, DataType.INTEGER, "I", "signal input", required=1, unused=0),
     ),
     outputs=output_channels("OUTPUT", MOST_CHANNELS, DataType.INTEGER, "O", "data output", required=1, holds=True),

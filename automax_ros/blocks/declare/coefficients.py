@@ -22,7 +22,7 @@ No signal comes near it, but coefficients that change continually can make such 
 Ends = tuple[float, float]
 """The lowest and the highest value of a parameter."""
 WM = Input("WM", DataType.REAL, "WM", "mapping frequency in rad/s, (2 pi / T) / 20 unless given", form=Form.LITERAL)
-RESET = Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False)
+RESET = Input.boolean("RESET", "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False)
 SATURATED = (
     Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
     Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),

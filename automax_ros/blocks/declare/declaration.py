@@ -27,7 +27,7 @@ import enum
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import floor
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 from automax_ros.blocks.declare.dynamics import Dynamics
 from automax_ros.core.numbers import clamp16, clamp32, round_count, sign_extended, truncated_quotient
@@ -135,6 +135,21 @@ class Input:
         """Its name in the step function."""
         return self.name.lower()
 
+    @staticmethod
+    def integer(name: str, symbol: str, text: str, default: int | None = None, **more: Any) -> Input:
+        """Return an INTEGER input, which is required without a default; ``more`` are further fields."""
+        return Input(name, DataType.INTEGER, symbol, text, default is None, default, **more)
+
+    @staticmethod
+    def boolean(name: str, symbol: str, text: str, *, default: bool | None = None, **more: Any) -> Input:
+        """Return a BOOLEAN input, which is required without a default; ``more`` are further fields."""
+        return Input(name, DataType.BOOLEAN, symbol, text, default is None, default, **more)
+
+    @staticmethod
+    def real(name: str, symbol: str, text: str, default: float | None = None, **more: Any) -> Input:
+        """Return a REAL input, which is required without a default; ``more`` are further fields."""
+        return Input(name, DataType.REAL, symbol, text, default is None, default, **more)
+
 
 @dataclass(frozen=True)
 class Output:
@@ -204,17 +219,20 @@ class Fault:
     code: str = "AMX4082"
 
 
-class Rule(Protocol):
+class Rule:
     """A rule over the set of parameters that a CALL gives, beyond those of each parameter."""
+
+    sentence: ClassVar[str]
+    """The rule for the documentation, a format string of the ``rule``'s fields."""
 
     @property
     def text(self) -> str:
         """The rule as a sentence for the documentation."""
-        ...
+        return self.sentence.format(rule=self)
 
-    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
-        """Return the faults of the given parameters, which are by keyword in the order of the CALL."""
-        ...
+    def fault(self, given: Mapping[str, Given]) -> Fault | None:
+        """Return the fault of the given parameters, which are by keyword in the order of the CALL."""
+        raise NotImplementedError
 
 
 Bound = Callable[[float, Mapping[str, float]], float]

@@ -90,7 +90,6 @@ def _product(minus: int, plus: int) -> tuple[int, ...]:
 
 
 def _value(polynomial: Sequence[float], at: complex) -> complex:
-    """Return the value of a polynomial, highest power first."""
     total = complex(0.0)
     for factor in polynomial:
         total = total * at + factor

@@ -8,15 +8,7 @@ from typing import Any
 
 from automax_ros.blocks.declare.channels import MOST_CHANNELS, programmed_channels
 from automax_ros.blocks.declare.coefficients import evaluate_noting, limited
-from automax_ros.blocks.declare.declaration import (
-    COEFFICIENT_LIMITED,
-    Access,
-    Block,
-    Form,
-    Input,
-    Special,
-    State,
-)
+from automax_ros.blocks.declare.declaration import COEFFICIENT_LIMITED, Access, Block, Form, Input, Special, State
 from automax_ros.core.types import DataType, Value
 
 Given = Value | Sequence[int]

@@ -58,10 +58,8 @@ BIT_SELECT = Block(
     title="Bit select",
     function="OUTPUT(INPUT - OFFSET) is TRUE, all other outputs are FALSE; all are FALSE if there is no such output",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
-        Input(
-            "OFFSET", DataType.INTEGER, "OFFSET", "subtracted from INPUT to give the number of the output", default=0
-        ),
+        Input.integer("INPUT", "I", "signal input"),
+        Input.integer("OFFSET", "OFFSET", "subtracted from INPUT to give the number of the output", 0),
     ),
     outputs=output_channels("OUTPUT", BITS, DataType.BOOLEAN, "O", "data output", required=0, first=0),
     rules=(AtLeast(1, names("OUTPUT", BITS, 0), "outputs"),),
@@ -188,7 +186,7 @@ UNPACK_BITS = Block(
     section="38",
     title="Unpack bits",
     function="OUTPUTn is bit n of INPUT",
-    inputs=(Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),),
+    inputs=(Input.integer("INPUT", "I", "signal input"),),
     outputs=output_channels("OUTPUT", BITS, DataType.BOOLEAN, "O", "data output for bit", required=0, first=0),
     rules=(AtLeast(1, names("OUTPUT", BITS, 0), "outputs"),),
     times=Times(Time(23.40, n=1.44), Time(106.0, n=7.3), Time(14.40, n=1.90), Time(16.40, n=1.00)),

@@ -23,12 +23,7 @@ from automax_ros.core.types import DataType
 
 
 def read_bits_step(
-    column: int,
-    enable: bool,
-    max_columns: int,
-    data: list[int],
-    head: int,
-    loaded: int,
+    column: int, enable: bool, max_columns: int, data: list[int], head: int, loaded: int
 ) -> tuple[bool, bool, bool, bool, bool, bool, bool, bool, bool, bool, int]:
     """Show a column while enabled; a column that does not exist gives FALSE and is logged (23)."""
     error = enable and (column < 0 or column >= max_columns)
@@ -48,29 +43,11 @@ def read_bits_step(
     output7 = bits & 64 != 0
     output8 = bits & 128 != 0
     writes = enable
-    return (
-        error,
-        output1,
-        output2,
-        output3,
-        output4,
-        output5,
-        output6,
-        output7,
-        output8,
-        writes,
-        problem,
-    )
+    return (error, output1, output2, output3, output4, output5, output6, output7, output8, writes, problem)
 
 
 def read_words_step(
-    column: int,
-    enable: bool,
-    max_columns: int,
-    channels: int,
-    data: list[int],
-    head: int,
-    loaded: int,
+    column: int, enable: bool, max_columns: int, channels: int, data: list[int], head: int, loaded: int
 ) -> tuple[bool, int, int, int, int, int, int, int, int, bool, int]:
     """Show a column while enabled; a column that does not exist gives 0 and is logged (24)."""
     error = enable and (column < 0 or column >= max_columns)
@@ -89,19 +66,7 @@ def read_words_step(
     output7 = data[cell + 6] if there and channels > 6 else 0
     output8 = data[cell + 7] if there and channels > 7 else 0
     writes = enable
-    return (
-        error,
-        output1,
-        output2,
-        output3,
-        output4,
-        output5,
-        output6,
-        output7,
-        output8,
-        writes,
-        problem,
-    )
+    return (error, output1, output2, output3, output4, output5, output6, output7, output8, writes, problem)
 
 
 def write_bits_step(
@@ -197,109 +162,63 @@ def write_words_step(
     return error, problem
 
 
-def _inputs(structure: Special, enable: str) -> tuple[Input, ...]:
-    return (
+_SHIFTED = "Only channels that the SHIFT block programs may be programmed, in any order."
+
+
+def _block(name: str, section: str, step: Step, times: Times) -> Block:
+    """Return the block that reads or writes columns of booleans or of words, as its name says."""
+    kind, structure = (DataType.BOOLEAN, Special.BITS) if name.endswith("BITS") else (DataType.INTEGER, Special.WORDS)
+    reads = name.startswith("READ")
+    enable = "TRUE shows the column, FALSE leaves the outputs as they are" if reads else "TRUE stores the inputs"
+    inputs: tuple[Input, ...] = (
         Input("STRUCTURE_NAME", structure, "SN", "name of the data structure, made by a SHIFT block", required=True),
-        Input("COLUMN", DataType.INTEGER, "COL", "number of the column, 0 to MCOL - 1", required=True),
-        Input("ENABLE", DataType.BOOLEAN, "EN", enable, required=True),
+        Input.integer("COLUMN", "COL", "number of the column, 0 to MCOL - 1"),
+        Input.boolean("ENABLE", "EN", enable),
     )
-
-
-def _error(text: str) -> Output:
-    return Output("ERROR", DataType.BOOLEAN, "E", text, required=False)
-
-
-_READS = "TRUE shows the column, FALSE leaves the outputs as they are"
-_WRITES = "TRUE stores the inputs"
-_NO_COLUMN = "TRUE if the column does not exist"
-_NOT_LOADED = "TRUE if the column does not exist, or was not yet loaded by the SHIFT block"
-_READ_NOTES = (
-    "While ENABLE is FALSE the outputs are not written, and ERROR is FALSE.",
-    "A column that is not loaded yet holds zeroes.",
-    "Only channels that the SHIFT block programs may be programmed, in any order.",
-)
-_WRITE_NOTES = (
-    "Channels that are not programmed keep their data. While ENABLE is FALSE, ERROR is FALSE.",
-    "A column that is not loaded yet is refused without being logged.",
-    "Only channels that the SHIFT block programs may be programmed, in any order.",
-)
-
-
-def _read(name: str, section: str, title: str, kind: DataType, structure: Special, step: Step, times: Times) -> Block:
+    error = "TRUE if the column does not exist"
+    if reads:
+        channels = output_channels("OUTPUT", MOST_CHANNELS, kind, "O", "data output", required=0, holds=True)
+        function = "OUTPUTn = channel n of column COLUMN of the data structure if ENABLE, else unchanged"
+        notes = (
+            "While ENABLE is FALSE the outputs are not written, and ERROR is FALSE.",
+            "A column that is not loaded yet holds zeroes.",
+        )
+    else:
+        channels = ()
+        inputs += input_channels("INPUT", MOST_CHANNELS, kind, "I", "data input", required=0, unused=None)
+        function = "Channel n of column COLUMN of the data structure = INPUTn if ENABLE"
+        error += ", or was not yet loaded by the SHIFT block"
+        notes = (
+            "Channels that are not programmed keep their data. While ENABLE is FALSE, ERROR is FALSE.",
+            "A column that is not loaded yet is refused without being logged.",
+        )
+    data = "OUTPUT" if reads else "INPUT"
     return Block(
         name=name,
         section=section,
-        title=title,
-        function="OUTPUTn = channel n of column COLUMN of the data structure if ENABLE, else unchanged",
-        inputs=_inputs(structure, _READS),
-        outputs=(
-            _error(_NO_COLUMN),
-            *output_channels("OUTPUT", MOST_CHANNELS, kind, "O", "data output", required=0, holds=True),
-        ),
-        rules=(AtLeast(1, names("OUTPUT", MOST_CHANNELS), "outputs"),),
+        title=name.replace("_", " ").capitalize(),
+        function=function,
+        inputs=inputs,
+        outputs=(Output("ERROR", DataType.BOOLEAN, "E", error, required=False), *channels),
+        rules=(AtLeast(1, names(data, MOST_CHANNELS), f"{data.lower()}s"),),
         logs=("AMX7005",),
         structure=Access.USES,
         runs_on=NOT_ON_UDC,
         times=times,
-        notes=_READ_NOTES,
+        notes=(*notes, _SHIFTED),
         step=step,
     )
 
 
-def _write(name: str, section: str, title: str, kind: DataType, structure: Special, step: Step, times: Times) -> Block:
-    return Block(
-        name=name,
-        section=section,
-        title=title,
-        function="Channel n of column COLUMN of the data structure = INPUTn if ENABLE",
-        inputs=(
-            *_inputs(structure, _WRITES),
-            *input_channels("INPUT", MOST_CHANNELS, kind, "I", "data input", required=0, unused=None),
-        ),
-        outputs=(_error(_NOT_LOADED),),
-        rules=(AtLeast(1, names("INPUT", MOST_CHANNELS), "inputs"),),
-        logs=("AMX7005",),
-        structure=Access.USES,
-        runs_on=NOT_ON_UDC,
-        times=times,
-        notes=_WRITE_NOTES,
-        step=step,
-    )
-
-
-READ_BITS = _read(
-    "READ_BITS",
-    "23",
-    "Read bits",
-    DataType.BOOLEAN,
-    Special.BITS,
-    read_bits_step,
-    Times(Time(24.32, n=1.12), Time(106.0, n=7.3), None, Time(17.04, n=0.80)),
+READ_BITS = _block(
+    "READ_BITS", "23", read_bits_step, Times(Time(24.32, n=1.12), Time(106.0, n=7.3), None, Time(17.04, n=0.80))
 )
-READ_WORDS = _read(
-    "READ_WORDS",
-    "24",
-    "Read words",
-    DataType.INTEGER,
-    Special.WORDS,
-    read_words_step,
-    Times(Time(25.76, n=1.28), Time(111.0, n=5.6), None, Time(18.04, n=0.92)),
+READ_WORDS = _block(
+    "READ_WORDS", "24", read_words_step, Times(Time(25.76, n=1.28), Time(111.0, n=5.6), None, Time(18.04, n=0.92))
 )
-WRITE_BITS = _write(
-    "WRITE_BITS",
-    "39",
-    "Write bits",
-    DataType.BOOLEAN,
-    Special.BITS,
-    write_bits_step,
-    Times(Time(25.56, j=1.36), Time(103.0, j=6.0), None, Time(17.88, j=0.96)),
+WRITE_BITS = _block(
+    "WRITE_BITS", "39", write_bits_step, Times(Time(25.56, j=1.36), Time(103.0, j=6.0), None, Time(17.88, j=0.96))
 )
-WRITE_WORDS = _write(
-    "WRITE_WORDS",
-    "40",
-    "Write words",
-    DataType.INTEGER,
-    Special.WORDS,
-    write_words_step,
-    Times(Time(25.52, j=0.36), Time(110.0, j=1.9), None, Time(17.88, j=0.28)),
+WRITE_WORDS = _block(
+    "WRITE_WORDS", "40", write_words_step, Times(Time(25.52, j=0.36), Time(110.0, j=1.9), None, Time(17.88, j=0.28))
 )

@@ -25,11 +25,11 @@ ALARM = Block(
     title="Alarm",
     function="Each ALARM output is TRUE while INPUT has reached or passed its limit",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE),
-        Input("HIGH_LIMIT", DataType.INTEGER, "HL", "high limit", default=INT16_MAX),
-        Input("LOW_LIMIT", DataType.INTEGER, "LL", "low limit", default=INT16_MIN),
-        Input("HIGH_HIGH_LIMIT", DataType.INTEGER, "HHL", "high-high limit", default=INT16_MAX),
-        Input("LOW_LOW_LIMIT", DataType.INTEGER, "LLL", "low-low limit", default=INT16_MIN),
+        Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE),
+        Input.integer("HIGH_LIMIT", "HL", "high limit", INT16_MAX),
+        Input.integer("LOW_LIMIT", "LL", "low limit", INT16_MIN),
+        Input.integer("HIGH_HIGH_LIMIT", "HHL", "high-high limit", INT16_MAX),
+        Input.integer("LOW_LOW_LIMIT", "LLL", "low-low limit", INT16_MIN),
     ),
     outputs=(
         Output("ALARM_HIGH", DataType.BOOLEAN, "AH", "INPUT >= HIGH_LIMIT", required=False),
@@ -57,10 +57,7 @@ COMPARE = Block(
     section="10",
     title="Compare",
     function="OUTPUT_GTR, OUTPUT_EQU, OUTPUT_LES tell whether INPUT1 is greater than, equal to, less than INPUT2",
-    inputs=(
-        Input("INPUT1", DataType.INTEGER, "I1", "data input 1", required=True),
-        Input("INPUT2", DataType.INTEGER, "I2", "data input 2", required=True),
-    ),
+    inputs=(Input.integer("INPUT1", "I1", "data input 1"), Input.integer("INPUT2", "I2", "data input 2")),
     outputs=(
         Output("OUTPUT_GTR", DataType.BOOLEAN, "GT", "INPUT1 > INPUT2", required=False),
         Output("OUTPUT_EQU", DataType.BOOLEAN, "EQ", "INPUT1 = INPUT2", required=False),

@@ -30,7 +30,7 @@ COUNTER = Block(
     title="Counter",
     function="OUTPUT = OUTPUT(n-1) + INPUT_PLUS - INPUT_MINUS",
     inputs=(
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE sets the count to PRESET", default=False),
+        Input.boolean("RESET", "R", "TRUE sets the count to PRESET", default=False),
         Input(
             "PRESET",
             DataType.DOUBLE,
@@ -40,8 +40,8 @@ COUNTER = Block(
             form=Form.VARIABLE,
             also=DataType.INTEGER,
         ),
-        Input("INPUT_PLUS", DataType.INTEGER, "IP", "added to the count in each scan", default=0),
-        Input("INPUT_MINUS", DataType.INTEGER, "IM", "subtracted from the count in each scan", default=0),
+        Input.integer("INPUT_PLUS", "IP", "added to the count in each scan", 0),
+        Input.integer("INPUT_MINUS", "IM", "subtracted from the count in each scan", 0),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the count, limited to -32768 to +32767"),),
     states=(State("count", DataType.DOUBLE, 0),),

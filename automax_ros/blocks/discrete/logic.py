@@ -9,14 +9,7 @@ from automax_ros.core.types import DataType
 
 
 def and_step(
-    input1: bool,
-    input2: bool,
-    input3: bool,
-    input4: bool,
-    input5: bool,
-    input6: bool,
-    input7: bool,
-    input8: bool,
+    input1: bool, input2: bool, input3: bool, input4: bool, input5: bool, input6: bool, input7: bool, input8: bool
 ) -> tuple[bool]:
     """Return TRUE if all inputs are; one that is not programmed is given as TRUE (8)."""
     output = input1 and input2 and input3 and input4 and input5 and input6 and input7 and input8
@@ -37,14 +30,7 @@ AND = Block(
 
 
 def or_step(
-    input1: bool,
-    input2: bool,
-    input3: bool,
-    input4: bool,
-    input5: bool,
-    input6: bool,
-    input7: bool,
-    input8: bool,
+    input1: bool, input2: bool, input3: bool, input4: bool, input5: bool, input6: bool, input7: bool, input8: bool
 ) -> tuple[bool]:
     """Return TRUE if any input is; one that is not programmed is given as FALSE (19)."""
     output = input1 or input2 or input3 or input4 or input5 or input6 or input7 or input8
@@ -77,12 +63,10 @@ LATCH = Block(
     title="Latch",
     function=("OUTPUT = FALSE if RESET, else TRUE if SET, else INPUT if CLOCK, else unchanged"),
     inputs=(
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE sets OUTPUT FALSE", default=False),
-        Input("SET", DataType.BOOLEAN, "S", "TRUE sets OUTPUT TRUE while RESET is FALSE", default=False),
-        Input(
-            "CLOCK", DataType.BOOLEAN, "CLK", "TRUE sets OUTPUT to INPUT while RESET and SET are FALSE", default=False
-        ),
-        Input("INPUT", DataType.BOOLEAN, "I", "data input, read while CLOCK is TRUE", default=False),
+        Input.boolean("RESET", "R", "TRUE sets OUTPUT FALSE", default=False),
+        Input.boolean("SET", "S", "TRUE sets OUTPUT TRUE while RESET is FALSE", default=False),
+        Input.boolean("CLOCK", "CLK", "TRUE sets OUTPUT to INPUT while RESET and SET are FALSE", default=False),
+        Input.boolean("INPUT", "I", "data input, read while CLOCK is TRUE", default=False),
     ),
     outputs=(Output("OUTPUT", DataType.BOOLEAN, "O", "data output", holds=True),),
     rules=(AtLeast(2, ("RESET", "SET", "CLOCK", "INPUT"), "inputs"),),
@@ -104,7 +88,7 @@ TRANSITION = Block(
     section="37",
     title="Transition",
     function="OUTPUT = TRUE when INPUT goes from off to on",
-    inputs=(Input("INPUT", DataType.BOOLEAN, "I", "signal input", required=True, form=Form.VARIABLE),),
+    inputs=(Input.boolean("INPUT", "I", "signal input", form=Form.VARIABLE),),
     outputs=(Output("OUTPUT", DataType.BOOLEAN, "O", "TRUE for one scan"),),
     states=(State("last", DataType.BOOLEAN, False),),
     times=Times(Time(11.36), Time(48.0), Time(11.90), Time(7.96)),

@@ -58,33 +58,24 @@ PULSE_MULT = Block(
     title="Pulse multiplier",
     function="OUTPUT = INT(counts * MULTIPLIER / 32768 + remainder of the last scan)",
     inputs=(
-        Input(
-            "INPUT",
-            DataType.INTEGER,
-            "I",
-            "counts, or counts/scan where WORD_SIZE is 0",
-            required=True,
-            form=Form.VARIABLE,
-        ),
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at 0 and clears the remainder", default=False),
-        Input(
+        Input.integer("INPUT", "I", "counts, or counts/scan where WORD_SIZE is 0", form=Form.VARIABLE),
+        Input.boolean("RESET", "R", "TRUE holds OUTPUT at 0 and clears the remainder", default=False),
+        Input.integer(
             "WORD_SIZE",
-            DataType.INTEGER,
             "WS",
             "significant bits of INPUT for relative mode; 0: absolute mode, INPUT is in counts/scan",
-            default=0,
+            0,
             form=Form.LITERAL,
             low=0,
             high=16,
         ),
-        Input(
+        Input.integer(
             "INITIAL_VALUE",
-            DataType.INTEGER,
             "IV",
             "the last INPUT, right-justified, on the scan on which RESET goes FALSE; relative mode only",
-            default=0,
+            0,
         ),
-        Input("MULTIPLIER", DataType.INTEGER, "M", "gain x 32768", default=32768),
+        Input.integer("MULTIPLIER", "M", "gain x 32768", 32768),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "counts/scan times the gain"),),
     states=(

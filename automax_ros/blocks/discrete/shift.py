@@ -106,19 +106,17 @@ def shift_bits_step(
 def _inputs(kind: DataType, structure: Special) -> tuple[Input, ...]:
     return (
         Input("STRUCTURE_NAME", structure, "SN", "name of the data structure, which the block makes", required=True),
-        Input(
+        Input.integer(
             "MAX_COLUMNS",
-            DataType.INTEGER,
             "MCOL",
             "number of columns, from 0 (input) to MCOL - 1 (output)",
-            required=True,
             form=Form.LITERAL,
             low=1,
             high=INT16_MAX,
         ),
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE zeroes all data and the outputs", default=False),
-        Input("SHIFT", DataType.BOOLEAN, "SH", "TRUE shifts while RESET is FALSE", required=True),
-        Input("ENABLE", DataType.BOOLEAN, "EN", "TRUE shifts the inputs into column 0, FALSE zeroes", default=True),
+        Input.boolean("RESET", "R", "TRUE zeroes all data and the outputs", default=False),
+        Input.boolean("SHIFT", "SH", "TRUE shifts while RESET is FALSE"),
+        Input.boolean("ENABLE", "EN", "TRUE shifts the inputs into column 0, FALSE zeroes", default=True),
         *input_channels("INPUT", MOST_CHANNELS, kind, "I", "data input", required=1, unused=kind.zero),
     )
 

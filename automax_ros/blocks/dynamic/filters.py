@@ -33,9 +33,9 @@ from automax_ros.blocks.declare.dynamics import Dynamics, Integrator, Transfer, 
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
 
-_INPUT = Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE)
-_WLG = Input("WLG", DataType.REAL, "WLG", "lag frequency in rad/s", required=True)
-_INITIAL_VALUE = Input("INITIAL_VALUE", DataType.INTEGER, "IV", "the output while RESET is TRUE", default=0)
+_INPUT = Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE)
+_WLG = Input.real("WLG", "WLG", "lag frequency in rad/s")
+_INITIAL_VALUE = Input.integer("INITIAL_VALUE", "IV", "the output while RESET is TRUE", 0)
 _LAG_LIMITS = (
     Limit("WM", per_period(2.0**-17), per_period(2.0 * math.pi / 4.5), "2**-17 / T", "2 pi / (4.5 T)"),
     Limit("WLG", times_c(TWO_TO_MINUS_18), times_c(0.71), "C x 2**-18", "0.71 C", uses=("WM",)),
@@ -80,7 +80,6 @@ def lag_step(
 
 
 def _coefficients(dynamics: Dynamics) -> Coefficients:
-    """Return the coefficients of LAG and of DIFF_LAG."""
     return Coefficients(
         parameters=("WLG", "WM"),
         names=("gain", "feedback", "span"),
@@ -180,7 +179,6 @@ LEAST_FREQUENCY = 0.001
 
 
 def _fastest(period_s: float) -> float:
-    """Return the high limit of LEAD_LAG's frequencies in rad/s."""
     return 2.0 * math.pi / (4.5 * period_s)
 
 
@@ -237,14 +235,7 @@ LEAD_LAG = Block(
     section="44",
     title="Lead/lag",
     function="(1 + s/WLD) / (1 + s/WLG)",
-    inputs=(
-        _INPUT,
-        Input("WLD", DataType.REAL, "WLD", "lead frequency in rad/s", required=True),
-        _WLG,
-        WM,
-        _INITIAL_VALUE,
-        RESET,
-    ),
+    inputs=(_INPUT, Input.real("WLD", "WLD", "lead frequency in rad/s"), _WLG, WM, _INITIAL_VALUE, RESET),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the filtered signal"),),
     states=(State("x1", DataType.INTEGER, 0), State("y1", DataType.REAL, 0.0)),
     coefficients=Coefficients(
@@ -252,11 +243,7 @@ LEAD_LAG = Block(
         names=("b0", "b1", "feedback"),
         limits=tuple(
             Limit(
-                name,
-                constant(LEAST_FREQUENCY),
-                lambda period_s, _values: _fastest(period_s),
-                "0.001",
-                "2 pi / (4.5 T)",
+                name, constant(LEAST_FREQUENCY), lambda period_s, _values: _fastest(period_s), "0.001", "2 pi / (4.5 T)"
             )
             for name in ("WM", "WLD", "WLG")
         ),

@@ -82,20 +82,17 @@ INTEGRATE = Block(
     title="Integrate",
     function="KI / s",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
-        Input("KI", DataType.REAL, "KI", "gain in 1/s", required=True),
+        Input.integer("INPUT", "I", "signal input"),
+        Input.real("KI", "KI", "gain in 1/s"),
         WM,
-        Input("INITIAL_VALUE", DataType.INTEGER, "IV", "the output while RESET is TRUE", default=0),
-        Input("LIMIT_PLUS", DataType.INTEGER, "LP", "upper limit of the integrator", default=INT16_MAX),
-        Input("LIMIT_MINUS", DataType.INTEGER, "LM", "lower limit of the integrator", default=-32767),
+        Input.integer("INITIAL_VALUE", "IV", "the output while RESET is TRUE", 0),
+        Input.integer("LIMIT_PLUS", "LP", "upper limit of the integrator", INT16_MAX),
+        Input.integer("LIMIT_MINUS", "LM", "lower limit of the integrator", -32767),
         RESET,
-        Input("HOLD_PLUS", DataType.BOOLEAN, "HP", "TRUE keeps OUTPUT from becoming more positive", default=False),
-        Input("HOLD_MINUS", DataType.BOOLEAN, "HM", "TRUE keeps OUTPUT from becoming more negative", default=False),
+        Input.boolean("HOLD_PLUS", "HP", "TRUE keeps OUTPUT from becoming more positive", default=False),
+        Input.boolean("HOLD_MINUS", "HM", "TRUE keeps OUTPUT from becoming more negative", default=False),
     ),
-    outputs=(
-        *SATURATED,
-        Output("OUTPUT", DataType.INTEGER, "O", "the integral"),
-    ),
+    outputs=(*SATURATED, Output("OUTPUT", DataType.INTEGER, "O", "the integral")),
     states=(State("x1", DataType.INTEGER, 0), State("y1", DataType.REAL, 0.0)),
     coefficients=Coefficients(
         parameters=("KI", "WM"),
@@ -188,25 +185,18 @@ PROP_INT = Block(
     title="Proportional + integral",
     function="KP (s + WLD) / s",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
-        Input("KP", DataType.REAL, "KP", "proportional gain", required=True),
-        Input("WLD", DataType.REAL, "WLD", "lead frequency in rad/s", required=True),
+        Input.integer("INPUT", "I", "signal input"),
+        Input.real("KP", "KP", "proportional gain"),
+        Input.real("WLD", "WLD", "lead frequency in rad/s"),
         WM,
-        Input("INITIAL_VALUE", DataType.INTEGER, "IV", "output and integrator while RESET is TRUE", default=0),
-        Input("LIMIT_PLUS", DataType.INTEGER, "LP", "upper limit of integrator and output", default=INT16_MAX),
-        Input("LIMIT_MINUS", DataType.INTEGER, "LM", "lower limit of integrator and output", default=INT16_MIN),
+        Input.integer("INITIAL_VALUE", "IV", "output and integrator while RESET is TRUE", 0),
+        Input.integer("LIMIT_PLUS", "LP", "upper limit of integrator and output", INT16_MAX),
+        Input.integer("LIMIT_MINUS", "LM", "lower limit of integrator and output", INT16_MIN),
         RESET,
-        Input(
-            "HOLD_PLUS", DataType.BOOLEAN, "HP", "TRUE keeps the integrator from becoming more positive", default=False
-        ),
-        Input(
-            "HOLD_MINUS", DataType.BOOLEAN, "HM", "TRUE keeps the integrator from becoming more negative", default=False
-        ),
+        Input.boolean("HOLD_PLUS", "HP", "TRUE keeps the integrator from becoming more positive", default=False),
+        Input.boolean("HOLD_MINUS", "HM", "TRUE keeps the integrator from becoming more negative", default=False),
     ),
-    outputs=(
-        *SATURATED,
-        Output("OUTPUT", DataType.INTEGER, "O", "integrator plus KP times INPUT"),
-    ),
+    outputs=(*SATURATED, Output("OUTPUT", DataType.INTEGER, "O", "integrator plus KP times INPUT")),
     states=(State("x1", DataType.INTEGER, 0), State("integrator", DataType.REAL, 0.0)),
     coefficients=Coefficients(
         parameters=("KP", "WLD", "WM"),

@@ -33,7 +33,7 @@ from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
 
 _Q_LIMIT = Limit("Q_FACTOR", constant(0.5), constant(100.0), "0.5", "100.0")
-_Q_FACTOR = Input("Q_FACTOR", DataType.REAL, "Q", "Q factor, 1 / (2 x damping factor)", required=True)
+_Q_FACTOR = Input.real("Q_FACTOR", "Q", "Q factor, 1 / (2 x damping factor)")
 
 
 def notch_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
@@ -102,10 +102,10 @@ NOTCH = Block(
     title="Notch filter",
     function="(s**2 + WN**2) / (s**2 + s WN/Q_FACTOR + WN**2)",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE),
+        Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE),
         _Q_FACTOR,
-        Input("WN", DataType.REAL, "WN", "notch frequency in rad/s", required=True),
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at 0", default=False),
+        Input.real("WN", "WN", "notch frequency in rad/s"),
+        Input.boolean("RESET", "R", "TRUE holds OUTPUT at 0", default=False),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the filtered signal"),),
     states=(
@@ -247,12 +247,12 @@ NOTCHN = Block(
     title="Notch filter of order 2 or 4",
     function="((s**2 + WN**2) / (s**2 + s WN/Q_FACTOR + WN**2)) ** (ORDER / 2)",
     inputs=(
-        Input("INPUT", DataType.INTEGER, "INPUT", "signal input", required=True),
-        Input("Q_FACTOR", DataType.REAL, "Q_FACTOR", "Q factor, 1 / (2 x damping factor)", required=True),
-        Input("WN", DataType.REAL, "WN", "centre frequency in rad/s", required=True),
-        Input("ORDER", DataType.INTEGER, "ORDER", "order", default=2, form=Form.LITERAL, one_of=(2, 4)),
-        Input("INITIAL_VALUE", DataType.INTEGER, "INITIAL_VALUE", "the output while RESET is TRUE", default=0),
-        Input("RESET", DataType.BOOLEAN, "RESET", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+        Input.integer("INPUT", "INPUT", "signal input"),
+        Input.real("Q_FACTOR", "Q_FACTOR", "Q factor, 1 / (2 x damping factor)"),
+        Input.real("WN", "WN", "centre frequency in rad/s"),
+        Input.integer("ORDER", "ORDER", "order", 2, form=Form.LITERAL, one_of=(2, 4)),
+        Input.integer("INITIAL_VALUE", "INITIAL_VALUE", "the output while RESET is TRUE", 0),
+        Input.boolean("RESET", "RESET", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "OUTPUT", "the filtered signal"),),
     states=(

@@ -131,27 +131,6 @@ def pass_filter_step(
     return output, x1, x2, x3, y1, y2, y3
 
 
-def _inputs(frequency: str, text: str) -> tuple[Input, ...]:
-    return (
-        Input("INPUT", DataType.INTEGER, "INPUT", "signal input", required=True),
-        Input(frequency, DataType.REAL, frequency, text, required=True),
-        Input("ORDER", DataType.INTEGER, "ORDER", "order", default=1, form=Form.LITERAL, one_of=(1, 2, 3)),
-        Input("INITIAL_VALUE", DataType.INTEGER, "INITIAL_VALUE", "the output while RESET is TRUE", default=0),
-        Input("RESET", DataType.BOOLEAN, "RESET", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
-    )
-
-
-def _limit(frequency: str) -> Limit:
-    return Limit(
-        frequency,
-        by_order({1: 0.000004, 2: 0.02, 3: 0.1}),
-        per_period(0.999 * math.pi),
-        "0.000004 / T, 0.02 / T or 0.1 / T by ORDER",
-        "0.999 pi / T",
-        uses=("ORDER",),
-    )
-
-
 def _dynamics(frequency: str, transfer: Callable[[float, Mapping[str, float]], Transfer], numerator: str) -> Dynamics:
     """Return the dynamics of a filter whose Laplace function has a power of ``numerator`` as its numerator."""
 
@@ -176,60 +155,80 @@ def _equation(values: Mapping[str, float]) -> str:
     return "y = gain (x" + "".join(f" + b{n} x{n}" for n in places) + ")" + "".join(f" + a{n} y{n}" for n in places)
 
 
-_NAMES = ("gain", "b1", "b2", "b3", "a1", "a2", "a3")
-_STATES = (
-    *(State(f"x{number}", DataType.INTEGER, 0) for number in (1, 2, 3)),
-    *(State(f"y{number}", DataType.REAL, 0.0) for number in (1, 2, 3)),
-)
+def _filter(
+    name: str,
+    also_called: str,
+    section: str,
+    title: str,
+    function: str,
+    frequency: str,
+    text: str,
+    transfer: Callable[[float, Mapping[str, float]], Transfer],
+    sign: float,
+    numerator: str,
+) -> Block:
+    """Return a filter with its ``frequency``; the powers of ``numerator`` are those of its Laplace function.
 
-HIGH_PASS_FILTER = Block(
-    name="HIGH_PASS_FILTER",
-    also_called=("LEADN",),
-    section="46",
-    title="Butterworth high-pass filter",
-    function=(
-        "ORDER 1: s / (s + WLD); 2: s**2 / (s**2 + sqrt(2) s WLD + WLD**2);"
-        " 3: s**3 / (s**3 + 2 s**2 WLD + 2 s WLD**2 + WLD**3)"
-    ),
-    inputs=_inputs("WLD", "lead frequency in rad/s: slower signals are attenuated"),
-    outputs=(Output("OUTPUT", DataType.INTEGER, "OUTPUT", "the filtered signal"),),
-    states=_STATES,
-    coefficients=Coefficients(
-        parameters=("WLD", "ORDER"),
-        names=_NAMES,
-        limits=(_limit("WLD"),),
-        defaults=order_default(1),
-        compute=_coefficients(high_pass_transfer, -1.0),
-        dynamics=_dynamics("WLD", high_pass_transfer, "s"),
-    ),
-    times=Times(None, None, Time(39.25, o=4.0), None),
-    runs_on=UDC_ONLY,
-    notes=("WLD maps onto itself: C = WLD / tan(WLD T / 2).",),
-    step=pass_filter_step,
-)
+    The histories of INPUT count as (1 + ``sign`` z**-1)**order.
+    """
+    lowest = by_order({1: 0.000004, 2: 0.02, 3: 0.1})
+    lowest_text = "0.000004 / T, 0.02 / T or 0.1 / T by ORDER"
+    return Block(
+        name=name,
+        also_called=(also_called,),
+        section=section,
+        title=title,
+        function=function,
+        inputs=(
+            Input.integer("INPUT", "INPUT", "signal input"),
+            Input.real(frequency, frequency, text),
+            Input.integer("ORDER", "ORDER", "order", 1, form=Form.LITERAL, one_of=(1, 2, 3)),
+            Input.integer("INITIAL_VALUE", "INITIAL_VALUE", "the output while RESET is TRUE", 0),
+            Input.boolean("RESET", "RESET", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+        ),
+        outputs=(Output("OUTPUT", DataType.INTEGER, "OUTPUT", "the filtered signal"),),
+        states=(
+            *(State(f"x{number}", DataType.INTEGER, 0) for number in (1, 2, 3)),
+            *(State(f"y{number}", DataType.REAL, 0.0) for number in (1, 2, 3)),
+        ),
+        coefficients=Coefficients(
+            parameters=(frequency, "ORDER"),
+            names=("gain", "b1", "b2", "b3", "a1", "a2", "a3"),
+            limits=(Limit(frequency, lowest, per_period(0.999 * math.pi), lowest_text, "0.999 pi / T", ("ORDER",)),),
+            defaults=order_default(1),
+            compute=_coefficients(transfer, sign),
+            dynamics=_dynamics(frequency, transfer, numerator),
+        ),
+        times=Times(None, None, Time(39.25, o=4.0), None),
+        runs_on=UDC_ONLY,
+        notes=(f"{frequency} maps onto itself: C = {frequency} / tan({frequency} T / 2).",),
+        step=pass_filter_step,
+    )
 
-LOW_PASS_FILTER = Block(
-    name="LOW_PASS_FILTER",
-    also_called=("LAGN",),
-    section="47",
-    title="Butterworth low-pass filter",
-    function=(
-        "ORDER 1: WLG / (s + WLG); 2: WLG**2 / (s**2 + sqrt(2) s WLG + WLG**2);"
-        " 3: WLG**3 / (s**3 + 2 s**2 WLG + 2 s WLG**2 + WLG**3)"
-    ),
-    inputs=_inputs("WLG", "lag frequency in rad/s: faster signals are attenuated"),
-    outputs=(Output("OUTPUT", DataType.INTEGER, "OUTPUT", "the filtered signal"),),
-    states=_STATES,
-    coefficients=Coefficients(
-        parameters=("WLG", "ORDER"),
-        names=_NAMES,
-        limits=(_limit("WLG"),),
-        defaults=order_default(1),
-        compute=_coefficients(low_pass_transfer, 1.0),
-        dynamics=_dynamics("WLG", low_pass_transfer, "{w:.6g}"),
-    ),
-    times=Times(None, None, Time(39.25, o=4.0), None),
-    runs_on=UDC_ONLY,
-    notes=("WLG maps onto itself: C = WLG / tan(WLG T / 2).",),
-    step=pass_filter_step,
+
+HIGH_PASS_FILTER = _filter(
+    "HIGH_PASS_FILTER",
+    "LEADN",
+    "46",
+    "Butterworth high-pass filter",
+    "ORDER 1: s / (s + WLD); 2: s**2 / (s**2 + sqrt(2) s WLD + WLD**2);"
+    " 3: s**3 / (s**3 + 2 s**2 WLD + 2 s WLD**2 + WLD**3)",
+    "WLD",
+    "lead frequency in rad/s: slower signals are attenuated",
+    high_pass_transfer,
+    -1.0,
+    "s",
+)
+LOW_PASS_FILTER = _filter(
+    "LOW_PASS_FILTER",
+    "LAGN",
+    "47",
+    "Butterworth low-pass filter",
+    "ORDER 1: WLG / (s + WLG); 2: WLG**2 / (s**2 + sqrt(2) s WLG + WLG**2);"
+    " 3: WLG**3 / (s**3 + 2 s**2 WLG + 2 s WLG**2 + WLG**3)",
+    "WLG",
+    "lag frequency in rad/s: faster signals are attenuated",
+    low_pass_transfer,
+    1.0,
+    "{w:.6g}",
 )

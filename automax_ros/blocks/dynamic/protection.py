@@ -60,19 +60,13 @@ TACHLOSS_OVERSPEED = Block(
     title="Tach loss and overspeed",
     function="SPEED_FAULT = OVERSPEED or TACH_LOSS or ARM_VFB_LOSS",
     inputs=(
-        Input("SPEED_FDBK", DataType.INTEGER, "SPEED_FDBK", "speed, typically 4095 = gear-in speed", required=True),
-        Input(
-            "ARM_VOLTAGE_FDBK",
-            DataType.INTEGER,
-            "ARM_VOLTAGE_FDBK",
-            "armature voltage, typically 3000 = rated voltage",
-            required=True,
-        ),
-        Input("OVERSPEED_LIM", DataType.INTEGER, "OVERSPEED_LIM", "speed above it is overspeed", default=4505),
-        Input("TL_SPD_LLIM", DataType.INTEGER, "TL_SPD_LLIM", "tach loss: speed below it ...", default=205),
-        Input("AV_SPD_LLIM", DataType.INTEGER, "AV_SPD_LLIM", "voltage loss: speed above it ...", default=1638),
-        Input("TL_VFB_LLIM", DataType.INTEGER, "TL_VFB_LLIM", "... while voltage lies above it", default=1200),
-        Input("ARM_VFB_LLIM", DataType.INTEGER, "ARM_VFB_LLIM", "... while voltage lies below it", default=150),
+        Input.integer("SPEED_FDBK", "SPEED_FDBK", "speed, typically 4095 = gear-in speed"),
+        Input.integer("ARM_VOLTAGE_FDBK", "ARM_VOLTAGE_FDBK", "armature voltage, typically 3000 = rated voltage"),
+        Input.integer("OVERSPEED_LIM", "OVERSPEED_LIM", "speed above it is overspeed", 4505),
+        Input.integer("TL_SPD_LLIM", "TL_SPD_LLIM", "tach loss: speed below it ...", 205),
+        Input.integer("AV_SPD_LLIM", "AV_SPD_LLIM", "voltage loss: speed above it ...", 1638),
+        Input.integer("TL_VFB_LLIM", "TL_VFB_LLIM", "... while voltage lies above it", 1200),
+        Input.integer("ARM_VFB_LLIM", "ARM_VFB_LLIM", "... while voltage lies below it", 150),
     ),
     outputs=(
         Output("SPEED_FAULT", DataType.BOOLEAN, "SPEED_FAULT", "TRUE while any of the three is"),
@@ -131,14 +125,7 @@ def thermal_coefficients(_period_s: float, values: Mapping[str, float]) -> tuple
 
 
 def thermal_overload_step(
-    i_fdbk: int,
-    reset: bool,
-    scale: float,
-    gain: float,
-    trip: float,
-    x1: float,
-    y1: float,
-    tripped: bool,
+    i_fdbk: int, reset: bool, scale: float, gain: float, trip: float, x1: float, y1: float, tripped: bool
 ) -> tuple[bool, int, float, float, bool]:
     """Filter the square of the current; the rise trips above the threshold, the rounded one ends at 100 % (36.1).
 
@@ -169,32 +156,21 @@ THERMAL_OVERLOAD = Block(
     title="Thermal overload",
     function="CALC_RISE = I_FDBK**2 / ((4095 / LIM_BAR)**2 * 10) * 1 / (1 + s/wlg); OVERLOAD above THRESHOLD**2 / 10",
     inputs=(
-        Input(
+        Input.integer(
             "I_FDBK",
-            DataType.INTEGER,
             "I_FDBK",
             "current feedback, 4095 counts = LIM_BAR % of the motor's current; a COMMON variable",
-            required=True,
             form=Form.VARIABLE,
             wants_common=True,
         ),
-        Input(
-            "LIM_BAR",
-            DataType.INTEGER,
-            "LIM_BAR",
-            "maximum current limit in %",
-            default=LIM_BAR,
-            drive_parameter="motor_overload_ratio",
+        Input.integer(
+            "LIM_BAR", "LIM_BAR", "maximum current limit in %", LIM_BAR, drive_parameter="motor_overload_ratio"
         ),
-        Input("THRESHOLD", DataType.INTEGER, "THRESHOLD", "current in % above which it trips", default=THRESHOLD),
-        Input(
-            "TRIP_TIME",
-            DataType.INTEGER,
-            "TRIP_TIME",
-            "seconds from a step of 100 % to LIM_BAR % of current to OVERLOAD",
-            default=TRIP_TIME,
+        Input.integer("THRESHOLD", "THRESHOLD", "current in % above which it trips", THRESHOLD),
+        Input.integer(
+            "TRIP_TIME", "TRIP_TIME", "seconds from a step of 100 % to LIM_BAR % of current to OVERLOAD", TRIP_TIME
         ),
-        Input("RESET", DataType.BOOLEAN, "RESET", "TRUE clears OVERLOAD and the rise; for tests only", default=False),
+        Input.boolean("RESET", "RESET", "TRUE clears OVERLOAD and the rise; for tests only", default=False),
     ),
     outputs=(
         Output("OVERLOAD", DataType.BOOLEAN, "OVERLOAD", "TRUE on overload; a COMMON variable", wants_common=True),

@@ -21,20 +21,23 @@ from automax_ros.compile.lowering.statements import GOSUB_DEPTH, StatementLoweri
 from automax_ros.compile.lowering.stores import converted_to, printable, store
 from automax_ros.core.types import DataType
 from automax_ros.language.program import OpenedFile
-from automax_ros.language.tree.basic_tree import (
+from automax_ros.language.tree.tree import (
     Close,
     Delay,
     Direction,
+    For,
     Get,
+    If,
     InputFile,
     OpenChannel,
     OpenPort,
     PrintFile,
     Put,
     StartEvery,
+    Statement,
+    Stop,
     WaitOn,
 )
-from automax_ros.language.tree.tree import For, If, Statement, Stop
 
 BURST_LIMIT = 1000
 """Statements that a BASIC task executes before others get their turn (decision: so no loop hangs the rack)."""

@@ -92,8 +92,11 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
     reads: list[tuple[Read, int | None]] = []
     for statement, line, _ in layout.numbered():
         context.line = line
-        if isinstance(statement, Call):
-            _check_call(context, statement)
+        if isinstance(statement, Call) and context.kind is TaskKind.BASIC:
+            hint = "control blocks run in control-block tasks (.BLK), which scan"
+            context.report("AMX4111", f"a BASIC task calls no block: {statement.block}", statement.span, hint)
+        elif isinstance(statement, Call):
+            check_call(context, statement)
         else:
             check_statement(context, statement)
             check_waiting(context, statement)
@@ -106,14 +109,6 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
     _check_expected_blocks(context, layout)
     _check_dynamic_blocks(context, layout)
     return layout
-
-
-def _check_call(context: Context, statement: Call) -> None:
-    if context.kind is TaskKind.BASIC:
-        hint = "control blocks run in control-block tasks (.BLK), which scan"
-        context.report("AMX4111", f"a BASIC task calls no block: {statement.block}", statement.span, hint)
-    else:
-        check_call(context, statement)
 
 
 def _check_expected_blocks(context: Context, layout: TaskLayout) -> None:
@@ -173,5 +168,4 @@ def _line_call(context: Context, layout: TaskLayout) -> BoundCall | None:
 
 
 def _executed(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
-    """Return the statements without the declarations."""
     return tuple(statement for statement in statements if not isinstance(statement, Declaration))

@@ -15,54 +15,35 @@ from automax_ros.language.parse.declarations import event_word
 from automax_ros.language.parse.expressions import expression, target
 from automax_ros.language.parse.statements import line_number, print_items
 from automax_ros.language.text.tokens import Kind, Token
-from automax_ros.language.tree.basic_tree import (
-    ITEM_TYPES,
-    Close,
-    Delay,
-    Direction,
-    Get,
-    InputFile,
-    OpenChannel,
-    OpenPort,
-    PrintFile,
-    Put,
-    StartEvery,
-    Unit,
-    WaitOn,
-)
-from automax_ros.language.tree.tree import Expression, Statement, Target
+from automax_ros.language.tree import tree
 
 _FORM = "AMX4110"
 ACCESSES = ("EXCLUSIVE", "NON_EXCLUSIVE")
 WAITING_KEYS = frozenset(
-    {"EVERY", "CHANNEL", "AS", "FILE", "TYPE", "DEPTH", "SETUP", "ACCESS", "EMPTY", "FULL", *ACCESSES, *ITEM_TYPES}
-    | {unit.value for unit in Unit}
+    {"EVERY", "CHANNEL", "AS", "FILE", "TYPE", "DEPTH", "SETUP", "ACCESS", "EMPTY", "FULL", *ACCESSES, *tree.ITEM_TYPES}
+    | {unit.value for unit in tree.Unit}
 )
 """Words inside these statements; none is reserved."""
 _OPEN_CHANNEL = "OPEN CHANNEL FOR INPUT AS FILE #1, TYPE = (I, R), DEPTH = 8"
 _OPEN_PORT = 'OPEN "PORTB" AS FILE #1, SETUP = 0D00H, 9600'
 
 
-def _wait(cursor: Cursor, start: Token) -> WaitOn:
+def _wait(cursor: Cursor, start: Token) -> tree.WaitOn:
     _word(cursor, "ON", f"ON is missing after {start.text}", "WAIT ON event")
-    return WaitOn(event_word(cursor))
+    return tree.WaitOn(event_word(cursor))
 
 
-def _delay(cursor: Cursor, start: Token) -> Delay:
-    return Delay(expression(cursor), _unit(cursor, start.text))
-
-
-def _start(cursor: Cursor, start: Token) -> StartEvery:
+def _start(cursor: Cursor, start: Token) -> tree.StartEvery:
     _word(cursor, "EVERY", f"EVERY is missing after {start.text}", "START EVERY 10 SECONDS")
-    return StartEvery(expression(cursor), _unit(cursor, "START EVERY"))
+    return tree.StartEvery(expression(cursor), _unit(cursor, "START EVERY"))
 
 
-def _unit(cursor: Cursor, word: str) -> Unit:
-    units = [unit.value for unit in Unit]
+def _unit(cursor: Cursor, word: str) -> tree.Unit:
+    units = [unit.value for unit in tree.Unit]
     if cursor.current.text not in units:
         hint = did_you_mean(cursor.current.text, units) or f"write {word} 10 TICKS; units are plural"
         cursor.fail(_FORM, f"{word} needs TICKS, SECONDS, MINUTES or HOURS, not {cursor.found()}", hint)
-    return Unit(cursor.advance().text)
+    return tree.Unit(cursor.advance().text)
 
 
 def _word(cursor: Cursor, word: str, message: str, form: str) -> None:
@@ -86,27 +67,27 @@ def _comma(cursor: Cursor, form: str) -> None:
     cursor.expect(",", "AMX0071", f"a comma is missing before {cursor.found()}", form)
 
 
-def _open(cursor: Cursor, start: Token) -> Statement:
+def _open(cursor: Cursor, start: Token) -> tree.Statement:
     if cursor.current.kind is Kind.STRING:
         return _open_port(cursor)
     _word(cursor, "CHANNEL", f"{start.text} needs CHANNEL or the name of a port", f"{_OPEN_CHANNEL}, or {_OPEN_PORT}")
     _word(cursor, "FOR", "FOR is missing after CHANNEL", _OPEN_CHANNEL)
     if not cursor.at("INPUT", "OUTPUT"):
         cursor.fail(_FORM, f"a channel is opened FOR INPUT or FOR OUTPUT, not {cursor.found()}", _OPEN_CHANNEL)
-    direction = Direction(cursor.advance().text)
+    direction = tree.Direction(cursor.advance().text)
     file = _as_file(cursor, _OPEN_CHANNEL)
     _comma(cursor, _OPEN_CHANNEL)
     _key(cursor, "TYPE", _OPEN_CHANNEL)
     types = _types(cursor)
-    depth: Expression | None = None
-    if direction is Direction.INPUT:
+    depth: tree.Expression | None = None
+    if direction is tree.Direction.INPUT:
         _comma(cursor, _OPEN_CHANNEL)
         _key(cursor, "DEPTH", _OPEN_CHANNEL)
         depth = expression(cursor)
-    return OpenChannel(direction, file, types, depth)
+    return tree.OpenChannel(direction, file, types, depth)
 
 
-def _open_port(cursor: Cursor) -> OpenPort:
+def _open_port(cursor: Cursor) -> tree.OpenPort:
     port = str(cursor.advance().value)
     file = _as_file(cursor, _OPEN_PORT)
     _comma(cursor, _OPEN_PORT)
@@ -115,10 +96,10 @@ def _open_port(cursor: Cursor) -> OpenPort:
         if not cursor.at(*ACCESSES):
             hint = did_you_mean(cursor.current.text, ACCESSES)
             cursor.fail(_FORM, f"ACCESS is EXCLUSIVE or NON_EXCLUSIVE, not {cursor.found()}", hint)
-        return OpenPort(port, file, access=cursor.advance().text)
+        return tree.OpenPort(port, file, access=cursor.advance().text)
     _key(cursor, "SETUP", _OPEN_PORT)
     setup = expression(cursor)
-    return OpenPort(port, file, setup, expression(cursor) if cursor.accept(",") else None)
+    return tree.OpenPort(port, file, setup, expression(cursor) if cursor.accept(",") else None)
 
 
 def _as_file(cursor: Cursor, form: str) -> int:
@@ -134,26 +115,19 @@ def _key(cursor: Cursor, key: str, form: str) -> None:
 
 def _types(cursor: Cursor) -> tuple[DataType, ...]:
     hint = "TYPE = (I, D, R, S, B): INTEGER, DOUBLE INTEGER, REAL, string, BOOLEAN"
+
+    def kind() -> DataType:
+        if cursor.current.text not in tree.ITEM_TYPES:
+            cursor.fail(_FORM, f"{cursor.found()} is not a type of a channel", hint)
+        return tree.ITEM_TYPES[cursor.advance().text]
+
     cursor.expect("(", _FORM, f"the list of TYPE stands in parentheses, {cursor.found()} does not", hint)
-    types = [_type(cursor, hint)]
-    while cursor.accept(","):
-        types.append(_type(cursor, hint))
+    types = cursor.separated(kind)
     cursor.expect(")", _FORM, f"`)` is missing before {cursor.found()}", hint)
-    return tuple(types)
-
-
-def _type(cursor: Cursor, hint: str) -> DataType:
-    if cursor.current.text not in ITEM_TYPES:
-        cursor.fail(_FORM, f"{cursor.found()} is not a type of a channel", hint)
-    return ITEM_TYPES[cursor.advance().text]
-
-
-def _close(cursor: Cursor, start: Token) -> Close:
-    return Close(_file(cursor, start.text))
+    return types
 
 
 def _branch_line(cursor: Cursor, word: str, key: str) -> int | None:
-    """Read the :EMPTY=line or :FULL=line of a statement, None where there is none."""
     if not cursor.accept(":"):
         return None
     form = f"{word}:{key}=100 #1, ..."
@@ -164,49 +138,46 @@ def _branch_line(cursor: Cursor, word: str, key: str) -> int | None:
     return line
 
 
-def _input(cursor: Cursor, start: Token) -> InputFile:
+def _input(cursor: Cursor, start: Token) -> tree.InputFile:
     empty = _branch_line(cursor, start.text, "EMPTY")
     if not cursor.at("#"):
         hint = "open a channel or a port and write INPUT #1, A%"
         cursor.fail(_FORM, f"{start.text} needs # and the number of a channel or port, not {cursor.found()}", hint)
     file = _file(cursor, start.text)
     _comma(cursor, "INPUT #1, A%, B%")
-    targets: list[Target] = [target(cursor, start.text)]
-    while cursor.accept(","):
-        targets.append(target(cursor, start.text))
-    return InputFile(file, tuple(targets), empty)
+    return tree.InputFile(file, cursor.separated(lambda: target(cursor, start.text)), empty)
 
 
-def _get(cursor: Cursor, start: Token) -> Get:
+def _get(cursor: Cursor, start: Token) -> tree.Get:
     empty = _branch_line(cursor, start.text, "EMPTY")
     file = _file(cursor, start.text)
     _comma(cursor, "GET #1, A$")
-    return Get(file, target(cursor, start.text), empty)
+    return tree.Get(file, target(cursor, start.text), empty)
 
 
-def _put(cursor: Cursor, start: Token) -> Put:
+def _put(cursor: Cursor, start: Token) -> tree.Put:
     file = _file(cursor, start.text)
     _comma(cursor, "PUT #1, A$")
-    return Put(file, expression(cursor))
+    return tree.Put(file, expression(cursor))
 
 
-def _print(cursor: Cursor, start: Token) -> Statement:
+def _print(cursor: Cursor, start: Token) -> tree.Statement:
     if not cursor.at("#", ":"):
         return print_items(cursor)
     full = _branch_line(cursor, start.text, "FULL")
     file = _file(cursor, start.text)
     if not cursor.accept(","):
-        return PrintFile(file, full=full)
+        return tree.PrintFile(file, full=full)
     printed = print_items(cursor)
-    return PrintFile(file, printed.items, printed.separators, full)
+    return tree.PrintFile(file, printed.items, printed.separators, full)
 
 
-WAITING_STATEMENTS: dict[str, Callable[[Cursor, Token], Statement]] = {
+WAITING_STATEMENTS: dict[str, Callable[[Cursor, Token], tree.Statement]] = {
     "WAIT": _wait,
-    "DELAY": _delay,
+    "DELAY": lambda cursor, start: tree.Delay(expression(cursor), _unit(cursor, start.text)),
     "START": _start,
     "OPEN": _open,
-    "CLOSE": _close,
+    "CLOSE": lambda cursor, start: tree.Close(_file(cursor, start.text)),
     "INPUT": _input,
     "GET": _get,
     "PUT": _put,

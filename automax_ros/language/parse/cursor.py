@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
+from collections.abc import Callable
+from typing import NoReturn, TypeVar
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import did_you_mean, printable
 from automax_ros.core.types import NAME_LIMIT, bare_name
 from automax_ros.language.text.reporter import Reporter, SyntaxFaultError
 from automax_ros.language.text.tokens import RESERVED_WORDS, Kind, SourceFault, Token
+
+_Item = TypeVar("_Item")
 
 
 class Cursor:
@@ -52,6 +55,13 @@ class Cursor:
             self.position += 1
             return True
         return False
+
+    def separated(self, read: Callable[[], _Item]) -> tuple[_Item, ...]:
+        """Read one item or more with commas between them."""
+        items = [read()]
+        while self.accept(","):
+            items.append(read())
+        return tuple(items)
 
     def at_end(self) -> bool:
         """Return whether a statement can end here."""

@@ -19,12 +19,10 @@ EVENT_KEYS = ("INTERRUPT_STATUS", "TIMEOUT")
 def declaration(cursor: Cursor, start: Token) -> Declaration:
     """Read the list after LOCAL, COMMON or GLOBAL."""
     scope = Scope.LOCAL if start.text == "LOCAL" else Scope.COMMON
-    variables = [_declared(cursor, start.text)]
-    while cursor.accept(","):
-        variables.append(_declared(cursor, start.text))
+    variables = cursor.separated(lambda: _declared(cursor, start.text))
     if cursor.current.is_name and not cursor.at("REM", "ELSE"):
         cursor.fail("AMX0071", f"a comma is missing before {cursor.found()}")
-    return Declaration(scope, tuple(variables))
+    return Declaration(scope, variables)
 
 
 def _declared(cursor: Cursor, word: str) -> Declared:
@@ -41,18 +39,15 @@ def _declared(cursor: Cursor, word: str) -> Declared:
         cursor.advance()
         length = _count(cursor, "the length of a string")
     subscripts: tuple[int, ...] = ()
-    if cursor.at("(") or (cursor.at("[") and not _begins_tuning(cursor)):
+    after = cursor.tokens[min(cursor.position + 2, len(cursor.tokens) - 1)]
+    begins_tuning = cursor.following.kind is Kind.WORD and after.text == "="
+    if cursor.at("(") or (cursor.at("[") and not begins_tuning):
         subscripts = _subscripts(cursor)
     tuning = _tuning(cursor) if cursor.at("[") else None
     if cursor.at("="):
         hint = f"give the value by a statement of its own: {name[:16]} = ..."
         cursor.fail("AMX0075", f"{word} gives no value", hint)
     return Declared(name, subscripts, length, tuning, span=token.span.to(cursor.previous.span))
-
-
-def _begins_tuning(cursor: Cursor) -> bool:
-    after = cursor.tokens[min(cursor.position + 2, len(cursor.tokens) - 1)]
-    return cursor.following.kind is Kind.WORD and after.text == "="
 
 
 def _count(cursor: Cursor, what: str) -> int:
@@ -66,12 +61,10 @@ def _count(cursor: Cursor, what: str) -> int:
 
 def _subscripts(cursor: Cursor) -> tuple[int, ...]:
     opening = cursor.advance()
-    counts = [_count(cursor, "the largest subscript")]
-    while cursor.accept(","):
-        counts.append(_count(cursor, "the largest subscript"))
+    counts = cursor.separated(lambda: _count(cursor, "the largest subscript"))
     if not cursor.accept(")" if opening.text == "(" else "]"):
         close_parenthesis(cursor, opening.span, opening.text)
-    return tuple(counts)
+    return counts
 
 
 def _tuning(cursor: Cursor) -> Tuning:
@@ -91,13 +84,7 @@ def _tuning(cursor: Cursor) -> Tuning:
             break
     if not cursor.accept("]"):
         close_parenthesis(cursor, opening.span, "[")
-    return Tuning(
-        given.get("CURRENT"),
-        given.get("HIGH"),
-        given.get("LOW"),
-        given.get("STEP"),
-        span=opening.span.to(cursor.previous.span),
-    )
+    return Tuning(*(given.get(key) for key in TUNING_KEYS), span=opening.span.to(cursor.previous.span))
 
 
 def event_word(cursor: Cursor) -> str:
@@ -109,9 +96,8 @@ def event_word(cursor: Cursor) -> str:
     return cursor.check_name(cursor.advance())
 
 
-def event(cursor: Cursor, start: Token) -> Event:
+def event(cursor: Cursor, _start: Token) -> Event:
     """Read EVENT NAME = event [, INTERRUPT_STATUS = variable, TIMEOUT = count] (section 4)."""
-    del start
     form = "EVENT NAME = event, INTERRUPT_STATUS = variable, TIMEOUT = count"
     cursor.expect("NAME", "AMX0076", "EVENT needs NAME = and the name of the event", form)
     cursor.expect("=", "AMX0035", "`=` is missing after NAME", form)

@@ -12,20 +12,8 @@ from automax_ros.core.diagnostics import Span
 from automax_ros.language.parse.cursor import Cursor
 from automax_ros.language.text.constants import LARGEST_REAL, SMALLEST_POSITIVE
 from automax_ros.language.text.tokens import BOOLEAN_WORDS, RESERVED_WORDS, Kind, SourceFault, Token
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.functions import FUNCTIONS, REFUSED_FUNCTIONS
-from automax_ros.language.tree.tree import (
-    Binary,
-    BooleanLiteral,
-    Element,
-    Expression,
-    FunctionCall,
-    IntegerLiteral,
-    RealLiteral,
-    Reference,
-    StringLiteral,
-    Target,
-    Unary,
-)
 
 DEPTH_LIMIT = 64
 """Deepest nesting of operations and parentheses in an expression (decision: a bound for untrusted sources)."""
@@ -44,30 +32,30 @@ LEVELS: dict[str, int] = {
 }
 """Binary operators by precedence; NOT is between AND and the relational ones, a sign above all."""
 _CLOSING = {"(": ")", "[": "]"}
-_Measured = tuple[Expression, int]
+_Measured = tuple[tree.Expression, int]
 
 
-def expression(cursor: Cursor) -> Expression:
+def expression(cursor: Cursor) -> tree.Expression:
     """Read an expression."""
     return _operation(cursor, 1, 1)[0]
 
 
-def variable(cursor: Cursor, what: str) -> Reference:
+def variable(cursor: Cursor, what: str) -> tree.Reference:
     """Read the name of a simple variable; ``what`` says in a message what needs one."""
     token = _variable_name(cursor, what)
-    return Reference(cursor.check_name(token), span=token.span)
+    return tree.Reference(cursor.check_name(token), span=token.span)
 
 
-def target(cursor: Cursor, what: str) -> Target:
+def target(cursor: Cursor, what: str) -> tree.Target:
     """Read a variable or an array element; ``what`` says in a message what needs one."""
     token = _variable_name(cursor, what)
     name = cursor.check_name(token)
     if cursor.at("(", "["):
-        return Element(name, _arguments(cursor, 1)[0], span=token.span.to(cursor.previous.span))
-    return Reference(name, span=token.span)
+        return tree.Element(name, _arguments(cursor, 1)[0], span=token.span.to(cursor.previous.span))
+    return tree.Reference(name, span=token.span)
 
 
-def constant(cursor: Cursor, what: str) -> Expression:
+def constant(cursor: Cursor, what: str) -> tree.Expression:
     """Read a constant, possibly with a sign; ``what`` says in a message what needs one."""
     sign = cursor.advance() if cursor.at("-", "+") else None
     token = cursor.current
@@ -76,7 +64,7 @@ def constant(cursor: Cursor, what: str) -> Expression:
         hint = "a string stands in quotes" if token.is_name and not boolean else None
         cursor.fail("AMX0073", f"{what} needs a constant, not {cursor.found()}", hint)
     value, _ = _literal(cursor, sign is not None and sign.text == "-")
-    return value if sign is None else Unary(sign.text, value, span=sign.span.to(value.span))
+    return value if sign is None else tree.Unary(sign.text, value, span=sign.span.to(value.span))
 
 
 def _variable_name(cursor: Cursor, what: str) -> Token:
@@ -104,7 +92,7 @@ def _operation(cursor: Cursor, level: int, depth: int) -> _Measured:
         right, right_height = _operation(cursor, operator_level + 1, depth + 1)
         height = max(height, right_height) + 1
         _check_depth(cursor, height)
-        left = Binary(operator, left, right, span=left.span.to(right.span))
+        left = tree.Binary(operator, left, right, span=left.span.to(right.span))
 
 
 def _negation(cursor: Cursor, level: int, depth: int) -> _Measured:
@@ -116,7 +104,7 @@ def _negation(cursor: Cursor, level: int, depth: int) -> _Measured:
         cursor.fail("AMX0041", "two operators in a row", "NOT NOT cancels out: remove both")
     operand, height = _operation(cursor, NOT_LEVEL + 1, depth + 1)
     _check_depth(cursor, height + 1)
-    return Unary("NOT", operand, span=start.span.to(operand.span)), height + 1
+    return tree.Unary("NOT", operand, span=start.span.to(operand.span)), height + 1
 
 
 def _signed(cursor: Cursor, depth: int) -> _Measured:
@@ -126,7 +114,7 @@ def _signed(cursor: Cursor, depth: int) -> _Measured:
     if cursor.at("-", "+", "NOT"):
         cursor.fail("AMX0041", "two operators in a row", "put parentheses around the second and its operand")
     operand, height = _primary(cursor, depth + 1, sign.text == "-")
-    return Unary(sign.text, operand, span=sign.span.to(operand.span)), height + 1
+    return tree.Unary(sign.text, operand, span=sign.span.to(operand.span)), height + 1
 
 
 def _primary(cursor: Cursor, depth: int, negative: bool) -> _Measured:
@@ -158,20 +146,19 @@ def _literal(cursor: Cursor, negative: bool) -> _Measured:
     cursor.reporter.report_token(token)
     value, span = token.value, token.span
     if isinstance(value, int):
-        return IntegerLiteral(value, token.text.endswith("H"), span=span), 1
+        return tree.IntegerLiteral(value, token.text.endswith("H"), span=span), 1
     if isinstance(value, float):
         value = value if token.fault is None else min(value, LARGEST_REAL)
         if not negative and token.fault is None and 0.0 < value < SMALLEST_POSITIVE:
             hint = "the smallest positive REAL is 5.4210107E-20"
             cursor.reporter.report(SourceFault("AMX0026", "the real constant is too small", hint), span)
-        return RealLiteral(value, token.text, span=span), 1
+        return tree.RealLiteral(value, token.text, span=span), 1
     if isinstance(value, str):
-        return StringLiteral(value, span=span), 1
-    return BooleanLiteral(BOOLEAN_WORDS[token.text], span=span), 1
+        return tree.StringLiteral(value, span=span), 1
+    return tree.BooleanLiteral(BOOLEAN_WORDS[token.text], span=span), 1
 
 
 def _named(cursor: Cursor, depth: int) -> _Measured:
-    """Read a variable, an array element or a call of a function."""
     token = cursor.current
     name = token.text
     if name in REFUSED_FUNCTIONS:
@@ -182,19 +169,19 @@ def _named(cursor: Cursor, depth: int) -> _Measured:
         arguments, height = _arguments(cursor, depth, empty=function is not None)
         span = token.span.to(cursor.previous.span)
         if function is not None:
-            return FunctionCall(name, arguments, span=span), height + 1
-        return Element(cursor.check_name(token), arguments, span=span), height + 1
+            return tree.FunctionCall(name, arguments, span=span), height + 1
+        return tree.Element(cursor.check_name(token), arguments, span=span), height + 1
     if function is None:
-        return Reference(cursor.check_name(token), span=token.span), 1
+        return tree.Reference(cursor.check_name(token), span=token.span), 1
     if function.arguments:
         cursor.fail("AMX0046", f"the function {name} needs its arguments in parentheses")
-    return FunctionCall(name, span=token.span), 1
+    return tree.FunctionCall(name, span=token.span), 1
 
 
-def _arguments(cursor: Cursor, depth: int, empty: bool = False) -> tuple[tuple[Expression, ...], int]:
+def _arguments(cursor: Cursor, depth: int, empty: bool = False) -> tuple[tuple[tree.Expression, ...], int]:
     """Read a list in parentheses or brackets; return its expressions and the largest height."""
     opening = cursor.advance()
-    arguments: list[Expression] = []
+    arguments: list[tree.Expression] = []
     height = 0
     if empty and cursor.at(_CLOSING[opening.text]):
         cursor.advance()

@@ -171,7 +171,6 @@ class FrameStack:
         self._top.statements.extend(frame.closed())
 
     def _close_inner(self, word: str) -> None:
-        """Close the blocks inside the innermost one of a kind, if there is one."""
         if any(frame.word == word for frame in reversed(self._frames)):
             while self._top.word != word:
                 self._close_unended()

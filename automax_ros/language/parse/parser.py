@@ -91,7 +91,6 @@ class _TaskParser:
             self._reporter.report(error.fault, error.span, error.notes)
 
     def _too_long(self, cursor: Cursor, line: LogicalLine) -> bool:
-        """Report a statement that is too long, before it is parsed."""
         first = cursor.current
         index = cursor.position
         while not cursor.tokens[index].kind.ends_segment:

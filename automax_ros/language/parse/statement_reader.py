@@ -19,10 +19,7 @@ from automax_ros.language.tree.task_kind import TaskKind
 from automax_ros.language.tree.tree import Expression, For, Goto, If, Statement
 
 _BLOCK_WORDS = ("FOR", "NEXT", "END_IF", "ENDIF")
-_STATEMENTS = {
-    TaskKind.CONTROL_BLOCK: SIMPLE_STATEMENTS,
-    TaskKind.BASIC: {**SIMPLE_STATEMENTS, **WAITING_STATEMENTS},
-}
+_STATEMENTS = {TaskKind.CONTROL_BLOCK: SIMPLE_STATEMENTS, TaskKind.BASIC: {**SIMPLE_STATEMENTS, **WAITING_STATEMENTS}}
 _ELSE_IF = ("ELSEIF", "ELSIF", "ELSE_IF")
 
 
@@ -101,7 +98,6 @@ class StatementReader:
             cursor.fail("AMX0059", "ELSE stands alone on its line in the block form of IF", hint)
 
     def _simple(self, cursor: Cursor) -> Statement:
-        """Read an assignment or a simple statement; its span ends on its first physical line."""
         start = cursor.position
         token = cursor.current
         read = self._reader(cursor) if token.kind is Kind.WORD else None

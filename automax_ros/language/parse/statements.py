@@ -9,29 +9,10 @@ from automax_ros.language.parse.cursor import Cursor
 from automax_ros.language.parse.declarations import declaration, event, event_word
 from automax_ros.language.parse.expressions import constant, expression, target
 from automax_ros.language.text.tokens import Kind, Token
-from automax_ros.language.tree.tree import (
-    Argument,
-    Assignment,
-    Call,
-    ClearErrorLog,
-    Data,
-    End,
-    Expression,
-    Gosub,
-    Goto,
-    IoWrite,
-    OnJump,
-    Print,
-    Read,
-    Restore,
-    Return,
-    SetEvent,
-    Statement,
-    Stop,
-)
+from automax_ros.language.tree import tree
 
 
-def call(cursor: Cursor, start: Token) -> Call:
+def call(cursor: Cursor, start: Token) -> tree.Call:
     """Read block(KEYWORD = value, ...), after CALL."""
     if cursor.current.kind is not Kind.WORD:
         cursor.fail("AMX0070", f"{start.text} needs the name of a block, not {cursor.found()}")
@@ -42,16 +23,16 @@ def call(cursor: Cursor, start: Token) -> Call:
             hint = f"names of blocks have no blanks: CALL {block.text[:20]}_{cursor.current.text[:20]}("
         cursor.fail("AMX0070", f"`(` is missing after {block.text[:20]}", hint)
     opening = cursor.advance()
-    arguments: list[Argument] = []
+    arguments: list[tree.Argument] = []
     if not cursor.accept(")"):
         arguments.append(_argument(cursor))
         while not cursor.accept(")"):
             _expect_comma(cursor, opening)
             arguments.append(_argument(cursor))
-    return Call(block.text, tuple(arguments))
+    return tree.Call(block.text, tuple(arguments))
 
 
-def _argument(cursor: Cursor) -> Argument:
+def _argument(cursor: Cursor) -> tree.Argument:
     key = cursor.current
     if cursor.at(")"):
         cursor.fail("AMX0070", "a parameter is missing between `,` and `)`", "remove the comma")
@@ -68,7 +49,7 @@ def _argument(cursor: Cursor) -> Argument:
         cursor.fail("AMX0035", f"`=` is missing after {key.text[:20]}")
     cursor.advance()
     value = expression(cursor)
-    return Argument(key.text, value, span=key.span.to(value.span))
+    return tree.Argument(key.text, value, span=key.span.to(value.span))
 
 
 def _expect_comma(cursor: Cursor, opening: Token) -> None:
@@ -92,11 +73,11 @@ def line_number(cursor: Cursor, word: str) -> int:
     return token.value
 
 
-def print_items(cursor: Cursor) -> Print:
+def print_items(cursor: Cursor) -> tree.Print:
     """Read items with `,` or `;` between them, to the end of the statement."""
     if cursor.at("USING"):
         cursor.fail("AMX0032", "PRINT USING is not part of the language", "print the values as they are")
-    items: list[Expression] = []
+    items: list[tree.Expression] = []
     separators: list[str] = []
     while not cursor.at_end() and not cursor.at("ELSE"):
         items.append(expression(cursor))
@@ -108,122 +89,63 @@ def print_items(cursor: Cursor) -> Print:
         if named or cursor.current.kind is Kind.STRING:
             cursor.fail("AMX0071", f"`,` or `;` is missing before {cursor.found()}")
         break
-    return Print(tuple(items), tuple(separators))
+    return tree.Print(tuple(items), tuple(separators))
 
 
-def _set(cursor: Cursor, start: Token) -> SetEvent:
-    del start
-    return SetEvent(event_word(cursor))
-
-
-def assignment(cursor: Cursor) -> Assignment:
+def assignment(cursor: Cursor) -> tree.Assignment:
     """Read target = value; LET has already been read."""
     left = target(cursor, "an assignment")
     if not cursor.at("="):
         hint = "names have no blanks" if cursor.current.is_name else None
         cursor.fail("AMX0035", f"`=` is missing: {cursor.found()} stands where it should be", hint)
     cursor.advance()
-    return Assignment(left, expression(cursor))
+    return tree.Assignment(left, expression(cursor))
 
 
-def _line_numbers(cursor: Cursor, word: str) -> tuple[int, ...]:
-    lines = [line_number(cursor, word)]
-    while cursor.accept(","):
-        lines.append(line_number(cursor, word))
-    if cursor.current.kind is Kind.INTEGER:
-        cursor.fail("AMX0071", f"a comma is missing before {cursor.found()}")
-    return tuple(lines)
-
-
-def _let(cursor: Cursor, start: Token) -> Assignment:
-    del start
-    return assignment(cursor)
-
-
-def _goto(cursor: Cursor, start: Token) -> Goto:
-    return Goto(line_number(cursor, start.text))
-
-
-def _gosub(cursor: Cursor, start: Token) -> Gosub:
-    return Gosub(line_number(cursor, start.text))
-
-
-def _on(cursor: Cursor, start: Token) -> OnJump:
+def _on(cursor: Cursor, start: Token) -> tree.OnJump:
     if cursor.at("ERROR"):
         cursor.fail("AMX0032", "ON ERROR is not part of the language", "test the error log with TST_ERRLOG@")
     selector = expression(cursor)
     if not cursor.at("GOTO", "GOSUB"):
         cursor.fail("AMX0063", f"GOTO or GOSUB is missing after {start.text}", "ON value GOTO line, line, ...")
     word = cursor.advance().text
-    return OnJump(selector, _line_numbers(cursor, word), word == "GOSUB")
+    lines = cursor.separated(lambda: line_number(cursor, word))
+    if cursor.current.kind is Kind.INTEGER:
+        cursor.fail("AMX0071", f"a comma is missing before {cursor.found()}")
+    return tree.OnJump(selector, lines, word == "GOSUB")
 
 
-def _return(cursor: Cursor, start: Token) -> Return:
-    del cursor, start
-    return Return()
+def _restore(cursor: Cursor, start: Token) -> tree.Restore:
+    return tree.Restore() if cursor.at_end() or cursor.at("ELSE") else tree.Restore(line_number(cursor, start.text))
 
 
-def _stop(cursor: Cursor, start: Token) -> Stop:
-    del cursor, start
-    return Stop()
-
-
-def _end(cursor: Cursor, start: Token) -> End:
-    del cursor, start
-    return End()
-
-
-def _clear_error_log(cursor: Cursor, start: Token) -> ClearErrorLog:
-    del cursor, start
-    return ClearErrorLog()
-
-
-def _read(cursor: Cursor, start: Token) -> Read:
-    targets = [target(cursor, start.text)]
-    while cursor.accept(","):
-        targets.append(target(cursor, start.text))
-    return Read(tuple(targets))
-
-
-def _data(cursor: Cursor, start: Token) -> Data:
-    values = [constant(cursor, start.text)]
-    while cursor.accept(","):
-        values.append(constant(cursor, start.text))
-    return Data(tuple(values))
-
-
-def _restore(cursor: Cursor, start: Token) -> Restore:
-    return Restore() if cursor.at_end() or cursor.at("ELSE") else Restore(line_number(cursor, start.text))
-
-
-def _print(cursor: Cursor, start: Token) -> Print:
-    del start
+def _print(cursor: Cursor, _start: Token) -> tree.Print:
     if cursor.at("#", ":"):
         hint = "PRINT without # writes to the task's log"
         cursor.fail("AMX0031", "PRINT to a port or channel belongs to BASIC tasks: it can suspend the task", hint)
     return print_items(cursor)
 
 
-def _io_write(cursor: Cursor, start: Token) -> IoWrite:
+def _io_write(cursor: Cursor, start: Token) -> tree.IoWrite:
     form = f"a comma is missing: {start.text} slot, register, value"
     slot = expression(cursor)
     cursor.expect(",", "AMX0071", form)
     register = expression(cursor)
     cursor.expect(",", "AMX0071", form)
-    return IoWrite(slot, register, expression(cursor))
+    return tree.IoWrite(slot, register, expression(cursor))
 
 
-SIMPLE_STATEMENTS: dict[str, Callable[[Cursor, Token], Statement]] = {
-    "LET": _let,
-    "GOTO": _goto,
-    "GOSUB": _gosub,
+SIMPLE_STATEMENTS: dict[str, Callable[[Cursor, Token], tree.Statement]] = {
+    "LET": lambda cursor, _: assignment(cursor),
+    "GOTO": lambda cursor, start: tree.Goto(line_number(cursor, start.text)),
+    "GOSUB": lambda cursor, start: tree.Gosub(line_number(cursor, start.text)),
     "ON": _on,
-    "RETURN": _return,
-    "STOP": _stop,
-    "END": _end,
-    "CLR_ERRLOG": _clear_error_log,
-    "READ": _read,
-    "DATA": _data,
+    "RETURN": lambda _, __: tree.Return(),
+    "STOP": lambda _, __: tree.Stop(),
+    "END": lambda _, __: tree.End(),
+    "CLR_ERRLOG": lambda _, __: tree.ClearErrorLog(),
+    "READ": lambda cursor, start: tree.Read(cursor.separated(lambda: target(cursor, start.text))),
+    "DATA": lambda cursor, start: tree.Data(cursor.separated(lambda: constant(cursor, start.text))),
     "RESTORE": _restore,
     "PRINT": _print,
     "IOWRITE": _io_write,
@@ -232,6 +154,6 @@ SIMPLE_STATEMENTS: dict[str, Callable[[Cursor, Token], Statement]] = {
     "GLOBAL": declaration,
     "EVENT": event,
     "CALL": call,
-    "SET": _set,
+    "SET": lambda cursor, _: tree.SetEvent(event_word(cursor)),
 }
 """The parser of each simple statement, called after its first word; SET may also be the name of a variable."""

@@ -19,8 +19,7 @@ LAST_LINE_NUMBER = 32767
 _NUMBER = re.compile(r"[ \t\f]*([0-9]+)")
 _FIRST_WORDS = "|".join(sorted(STATEMENT_WORDS - {"ELSE", "ON"}))
 _NUMBERED_STATEMENT = re.compile(
-    rf"[ \t\f]*[0-9]{{1,5}}[ \t]*(?:(?:{_FIRST_WORDS})(?![A-Z0-9_%!@$])|[A-Z_][A-Z0-9_]*[%!@$]?[ \t]*=)",
-    re.IGNORECASE,
+    rf"[ \t\f]*[0-9]{{1,5}}[ \t]*(?:(?:{_FIRST_WORDS})(?![A-Z0-9_%!@$])|[A-Z_][A-Z0-9_]*[%!@$]?[ \t]*=)", re.IGNORECASE
 )
 END_OF_FILE = "\x1a"
 """Ctrl-Z, at which DOS stops reading a text."""

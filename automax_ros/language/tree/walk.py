@@ -4,42 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from automax_ros.language.tree.basic_tree import (
-    Delay,
-    Get,
-    InputFile,
-    OpenChannel,
-    OpenPort,
-    PrintFile,
-    Put,
-    StartEvery,
-)
-from automax_ros.language.tree.tree import (
-    Argument,
-    Assignment,
-    Binary,
-    Call,
-    Element,
-    Expression,
-    For,
-    FunctionCall,
-    Gosub,
-    Goto,
-    If,
-    IoWrite,
-    OnJump,
-    Print,
-    Read,
-    Reference,
-    Statement,
-    Target,
-    Unary,
-)
+from automax_ros.language.tree import tree
 
 
 def statements_in_order(
-    statements: Iterable[Statement], line: int | None = None
-) -> Iterator[tuple[Statement, int | None]]:
+    statements: Iterable[tree.Statement], line: int | None = None
+) -> Iterator[tuple[tree.Statement, int | None]]:
     """Yield every statement, those inside IF and FOR included, in the order of the text, with the line number in force.
 
     ``line`` is the number in force before the first statement.
@@ -53,97 +23,92 @@ def statements_in_order(
                 line = inner_line
 
 
-def bodies(statement: Statement) -> tuple[tuple[Statement, ...], ...]:
+def bodies(statement: tree.Statement) -> tuple[tuple[tree.Statement, ...], ...]:
     """Return the statement lists inside a statement: THEN and ELSE of an IF, the body of a FOR."""
-    if isinstance(statement, If):
+    if isinstance(statement, tree.If):
         return statement.then, statement.otherwise
-    if isinstance(statement, For):
+    if isinstance(statement, tree.For):
         return (statement.body,)
     return ()
 
 
-def expressions_of(statement: Statement) -> tuple[Expression, ...]:
+_EXPRESSIONS: dict[type[tree.Statement], tuple[str, ...]] = {
+    tree.Assignment: ("target", "value"),
+    tree.If: ("condition",),
+    tree.For: ("variable", "start", "stop", "step"),
+    tree.OnJump: ("selector",),
+    tree.Read: ("targets",),
+    tree.Print: ("items",),
+    tree.IoWrite: ("slot", "register", "value"),
+    tree.Delay: ("count",),
+    tree.StartEvery: ("count",),
+    tree.OpenChannel: ("depth",),
+    tree.OpenPort: ("setup", "baud"),
+    tree.InputFile: ("targets",),
+    tree.PrintFile: ("items",),
+    tree.Get: ("target",),
+    tree.Put: ("item",),
+}
+"""The fields of BASIC statements with expressions, in the order of the text; targets count too."""
+_WRITTEN = ("target", "targets", "variable")
+"""The fields with the variables and elements that a statement writes."""
+
+
+def expressions_of(statement: tree.Statement) -> tuple[tree.Expression, ...]:
     """Return the expressions of a BASIC statement itself, without those of statements inside it; targets count too."""
-    if isinstance(statement, Assignment):
-        return statement.target, statement.value
-    if isinstance(statement, If):
-        return (statement.condition,)
-    if isinstance(statement, For):
-        step = () if statement.step is None else (statement.step,)
-        return (statement.variable, statement.start, statement.stop, *step)
-    if isinstance(statement, OnJump):
-        return (statement.selector,)
-    if isinstance(statement, Read):
-        return statement.targets
-    if isinstance(statement, Print):
-        return statement.items
-    if isinstance(statement, IoWrite):
-        return statement.slot, statement.register, statement.value
-    return _expressions_of_waiting(statement)
+    found: list[tree.Expression] = []
+    for name in _EXPRESSIONS.get(type(statement), ()):
+        value = getattr(statement, name)
+        found += value if isinstance(value, tuple) else () if value is None else (value,)
+    return tuple(found)
 
 
-def _expressions_of_waiting(statement: Statement) -> tuple[Expression, ...]:
-    if isinstance(statement, (Delay, StartEvery)):
-        return (statement.count,)
-    if isinstance(statement, OpenChannel):
-        return () if statement.depth is None else (statement.depth,)
-    if isinstance(statement, OpenPort):
-        return tuple(part for part in (statement.setup, statement.baud) if part is not None)
-    if isinstance(statement, InputFile):
-        return statement.targets
-    if isinstance(statement, PrintFile):
-        return statement.items
-    if isinstance(statement, Get):
-        return (statement.target,)
-    return (statement.item,) if isinstance(statement, Put) else ()
-
-
-def targets_of(statement: Statement) -> tuple[Target, ...]:
+def targets_of(statement: tree.Statement) -> tuple[tree.Target, ...]:
     """Return the variables and elements that a BASIC statement writes."""
-    if isinstance(statement, (Assignment, Get)):
-        return (statement.target,)
-    if isinstance(statement, (Read, InputFile)):
-        return statement.targets
-    return (statement.variable,) if isinstance(statement, For) else ()
+    name = _EXPRESSIONS.get(type(statement), ("",))[0]
+    if name not in _WRITTEN:
+        return ()
+    value: tree.Target | tuple[tree.Target, ...] = getattr(statement, name)
+    return value if isinstance(value, tuple) else (value,)
 
 
-def jumps_of(statement: Statement) -> tuple[int, ...]:
+def jumps_of(statement: tree.Statement) -> tuple[int, ...]:
     """Return the lines to which a statement itself may jump, without those of statements inside it."""
-    if isinstance(statement, (Goto, Gosub)):
+    if isinstance(statement, (tree.Goto, tree.Gosub)):
         return (statement.line,)
-    if isinstance(statement, OnJump):
+    if isinstance(statement, tree.OnJump):
         return statement.lines
     line = None
-    if isinstance(statement, (InputFile, Get)):
+    if isinstance(statement, (tree.InputFile, tree.Get)):
         line = statement.empty
-    elif isinstance(statement, PrintFile):
+    elif isinstance(statement, tree.PrintFile):
         line = statement.full
     return () if line is None else (line,)
 
 
-def parts(expression: Expression) -> Iterator[Expression]:
+def parts(expression: tree.Expression) -> Iterator[tree.Expression]:
     """Yield an expression and everything inside it, in the order of the text."""
     pending = [expression]
     while pending:
         current = pending.pop()
         yield current
-        if isinstance(current, Binary):
+        if isinstance(current, tree.Binary):
             pending += [current.right, current.left]
-        elif isinstance(current, Unary):
+        elif isinstance(current, tree.Unary):
             pending.append(current.operand)
-        elif isinstance(current, Element):
+        elif isinstance(current, tree.Element):
             pending += reversed(current.subscripts)
-        elif isinstance(current, FunctionCall):
+        elif isinstance(current, tree.FunctionCall):
             pending += reversed(current.arguments)
 
 
-def variables_in(expression: Expression) -> Iterator[Reference | Element]:
+def variables_in(expression: tree.Expression) -> Iterator[tree.Reference | tree.Element]:
     """Yield the variables and elements inside an expression, in the order of the text."""
     for part in parts(expression):
-        if isinstance(part, (Reference, Element)):
+        if isinstance(part, (tree.Reference, tree.Element)):
             yield part
 
 
-def arguments_of(statement: Statement) -> tuple[Argument, ...]:
+def arguments_of(statement: tree.Statement) -> tuple[tree.Argument, ...]:
     """Return the parameters of a CALL, () for other statements."""
-    return statement.arguments if isinstance(statement, Call) else ()
+    return statement.arguments if isinstance(statement, tree.Call) else ()

@@ -16,7 +16,6 @@ from automax_ros.core.diagnostics import Diagnostic, Span
 from automax_ros.core.kinds import Direction
 from automax_ros.core.names import PREDEFINED
 from automax_ros.language.program import BoundCall, Program
-from automax_ros.language.tree.basic_tree import StartEvery
 from automax_ros.language.tree.tree import (
     Assignment,
     BooleanLiteral,
@@ -26,6 +25,7 @@ from automax_ros.language.tree.tree import (
     IntegerLiteral,
     Reference,
     Scope,
+    StartEvery,
     Statement,
 )
 from automax_ros.language.tree.walk import expressions_of, jumps_of, statements_in_order, targets_of, variables_in

@@ -8,7 +8,7 @@ from typing import cast
 from automax_ros.core.names import element_name
 from automax_ros.core.types import Value, same_bits
 from automax_ros.core.values import source_text
-from automax_ros.language.tree.basic_tree import Direction
+from automax_ros.language.tree.tree import Direction
 from automax_ros.messages.types.messages import Scan
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.recordings.read.common_log import Entry, Key

@@ -4,7 +4,6 @@ from compile.support import run_scans, task_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.blocks.declare.instance import InstanceError
 from blocks.support import int16, repeatable, run
 
 
@@ -18,11 +17,6 @@ def test_the_magnitude_of_minus_32768_does_not_fit_and_clamps():
     block = run("ABSOLUTE_VALUE")
     assert block.scan(input=-32768) == {"output": 32767}
     assert block.error == 0
-
-
-def test_input_must_be_a_variable():
-    with pytest.raises(InstanceError, match="ABSOLUTE_VALUE: INPUT must be a variable"):
-        run("ABSOLUTE_VALUE", input=5)
 
 
 @repeatable

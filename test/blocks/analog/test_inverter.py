@@ -3,7 +3,6 @@ from compile.support import ran
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.blocks.declare.instance import InstanceError
 from blocks.support import int16, repeatable, run
 
 
@@ -22,11 +21,6 @@ def test_minus_minus_32768_clamps():
     block = run("INVERTER")
     assert block.scan(input=-32768) == {"output": 32767}
     assert block.error == 0
-
-
-def test_input_must_be_a_variable():
-    with pytest.raises(InstanceError, match="INVERTER: INPUT must be a variable"):
-        run("INVERTER", input=5)
 
 
 @repeatable

@@ -80,3 +80,9 @@ def test_driving_needs_what_scanning_needs():
         next(run("RAMP").drive("speed", [1]))
     with pytest.raises(InstanceError, match="LAG needs WLG"):
         next(run("LAG").drive("input", [1]))
+
+
+@pytest.mark.parametrize("name", ["ABSOLUTE_VALUE", "ALARM", "INVERTER"])
+def test_input_must_be_a_variable(name):
+    with pytest.raises(InstanceError, match=f"{name}: INPUT must be a variable"):
+        run(name, input=5)

@@ -4,7 +4,7 @@ from automax_ros.blocks.catalogue import CATALOGUE
 
 
 def faults(name, *given):
-    return [fault for rule in CATALOGUE[name].rules for fault in rule.faults(dict.fromkeys(given))]
+    return [fault for rule in CATALOGUE[name].rules if (fault := rule.fault(dict.fromkeys(given)))]
 
 
 @pytest.mark.parametrize("name", ["AND", "OR"])

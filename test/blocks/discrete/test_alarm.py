@@ -3,7 +3,6 @@ import pytest
 from compile.support import ran
 from hypothesis import given
 
-from automax_ros.blocks.declare.instance import InstanceError
 from blocks.support import int16, repeatable, run
 
 LIMITS = {"low_low_limit": -200, "low_limit": -100, "high_limit": 100, "high_high_limit": 200}
@@ -72,11 +71,6 @@ def test_limits_may_be_variables():
     block = run("ALARM")
     assert alarms(block, 10, high_limit=11) == set()
     assert alarms(block, 10, high_limit=10) == {"high"}
-
-
-def test_input_must_be_a_variable():
-    with pytest.raises(InstanceError, match="ALARM: INPUT must be a variable"):
-        run("ALARM", input=5)
 
 
 @repeatable

@@ -91,7 +91,7 @@ def test_sees_shift_and_reset_at_once(kind):
     assert [block.scan(column=column, enable=True)["output1"] for column in (0, 1)] == [0, 0]
 
 
-@pytest.mark.parametrize("name", ["READ_BITS", "READ_WORDS"])
+@pytest.mark.parametrize("name", ["READ_BITS", "READ_WORDS", "WRITE_BITS", "WRITE_WORDS"])
 def test_needs_a_structure(name):
     with pytest.raises(InstanceError):
         Instance(CATALOGUE[name], TICK)

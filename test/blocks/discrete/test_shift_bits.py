@@ -1,11 +1,9 @@
 """SHIFT_BITS (section 30)."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from blocks.discrete.test_shift_words import Shifter
-from blocks.support import repeatable, run
+from blocks.support import run
 
 
 def test_what_enters_leaves_max_columns_less_one_shifts_later():
@@ -70,14 +68,3 @@ def test_32767_columns_of_eight_channels():
         assert not any(block.outputs.values())
     assert list(block.scan(shift=True, **opposite).values()) == [True, *pattern]
     assert list(block.scan(shift=True, **opposite).values()) == [True, *(not state for state in pattern)]
-
-
-@repeatable
-@given(st.integers(1, 6), st.integers(1, 8), st.data())
-def test_against_a_list_of_columns(columns, channels, data):
-    shifter = Shifter("SHIFT_BITS", columns, channels)
-    values = st.lists(st.booleans(), min_size=channels, max_size=channels)
-    likely = st.integers(0, 5).map(bool)
-    rows = st.tuples(values, likely, likely, likely, st.none() | values)
-    for column, shift, enable, kept, foreign in data.draw(st.lists(rows, max_size=40)):
-        shifter.scan(column, shift=shift, enable=enable, reset=not kept, foreign=foreign)

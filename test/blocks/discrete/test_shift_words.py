@@ -164,11 +164,12 @@ def test_max_columns_out_of_range_is_refused(columns):
         run("SHIFT_WORDS", max_columns=columns)
 
 
+@pytest.mark.parametrize(("name", "value"), [("SHIFT_BITS", st.booleans()), ("SHIFT_WORDS", int16)])
 @repeatable
 @given(st.integers(1, 6), st.integers(1, 8), st.data())
-def test_against_a_list_of_columns(columns, channels, data):
-    shifter = Shifter("SHIFT_WORDS", columns, channels)
-    values = st.lists(int16, min_size=channels, max_size=channels)
+def test_against_a_list_of_columns(name, value, columns, channels, data):
+    shifter = Shifter(name, columns, channels)
+    values = st.lists(value, min_size=channels, max_size=channels)
     likely = st.integers(0, 5).map(bool)
     rows = st.tuples(values, likely, likely, likely, st.none() | values)
     for column, shift, enable, kept, foreign in data.draw(st.lists(rows, max_size=40)):

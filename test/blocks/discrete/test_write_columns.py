@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declare.instance import Instance, InstanceError
+from automax_ros.blocks.declare.instance import Instance
 from blocks.discrete.test_shift_words import Shifter
 from blocks.support import TICK, int16, repeatable
 
@@ -103,12 +103,6 @@ def test_without_enable_nothing_is_stored_or_logged(kind, column):
     assert write.scan(column=column, enable=False, input1=sample(kind)) == {"error": False}
     assert write.error == 0
     assert on(shifter, f"READ_{kind}").scan(column=0, enable=True)["output1"] == zero
-
-
-@pytest.mark.parametrize("name", ["WRITE_BITS", "WRITE_WORDS"])
-def test_needs_a_structure(name):
-    with pytest.raises(InstanceError):
-        Instance(CATALOGUE[name], TICK)
 
 
 @st.composite

@@ -2,19 +2,11 @@ import math
 
 import numpy as np
 import pytest
-from language.check_support import problems, task
 
-from automax_ros.blocks.declare.declaration import Platform
-from automax_ros.core.diagnostics import Severity
 from blocks.support import TICK, filtered, mapping_constant, outputs_of, run, signals
 
 C = mapping_constant(0.0055)
 ROUNDED = 0.5 + 1e-6
-
-
-def errors_of(text, **options):
-    """The codes of the errors; a UDC task without THERMAL_OVERLOAD, say, has a warning besides."""
-    return [item.code for item in problems(text, **options) if item.severity is Severity.ERROR]
 
 
 def kx(share):
@@ -195,24 +187,3 @@ def test_a_smaller_gain_limits_the_output_on_the_next_scan():
 def test_a_constant_input_integrates_like_a_variable():
     block = run("INTEGRATE", ki=0.59507, input=2000)
     assert [block.scan()["output"] for _ in range(50)] == outputs_of(run("INTEGRATE", ki=0.59507), [2000] * 50)
-
-
-@pytest.mark.parametrize("target", list(Platform))
-def test_runs_everywhere(target):
-    assert errors_of(task("CALL INTEGRATE(INPUT=A%, KI=1.0, OUTPUT=B%)"), target=target, tick_ns=500_000) == []
-
-
-@pytest.mark.parametrize(
-    ("parameters", "code"),
-    [
-        ("INPUT=5, KI=1.0, OUTPUT=B%", None),
-        ("INPUT=A%, KI=R, WM=10.0, LIMIT_PLUS=C%, LIMIT_MINUS=-5, HOLD_PLUS=TRUE, HOLD_MINUS=-X@, OUTPUT=B%", None),
-        ("INPUT=A%, KI=1.0, WM=R, OUTPUT=B%", "AMX4076"),
-        ("INPUT=A%, KI=1, OUTPUT=B%", "AMX2016"),
-        ("INPUT=A%, OUTPUT=B%", "AMX4074"),
-        ("KI=1.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, KI=1.0", "AMX4074"),
-    ],
-)
-def test_how_parameters_may_be_written(parameters, code):
-    assert errors_of(task(f"CALL INTEGRATE({parameters})")) == ([] if code is None else [code])

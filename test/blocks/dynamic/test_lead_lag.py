@@ -4,23 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from language.check_support import one, problems, task
+from language.check_support import errors_of, one, task
 from scipy import signal
 
-from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.blocks.declare.instance import InstanceError
-from automax_ros.core.diagnostics import Severity
-from blocks.support import TICK, filtered, mapping_constant, outputs_of, run, signals
+from blocks.support import TICK, changed, filtered, mapping_constant, outputs_of, run, signals
 
 C = mapping_constant(0.0055)
 HIGH = 2 * math.pi / (4.5 * 0.0055)
 ROUNDED = 0.5 + 1e-6
 LIMITED = 7004
-
-
-def errors_of(text, **options):
-    """The codes of the errors; a UDC task without THERMAL_OVERLOAD, say, has a warning besides."""
-    return [item.code for item in problems(text, **options) if item.severity is Severity.ERROR]
 
 
 def reference(wld, wlg, inputs, c=C):
@@ -114,10 +107,8 @@ def test_changed_frequencies_act_on_the_histories():
     outputs = [
         block.scan(input=int(value), wld=5.0 if n < 200 else 60.0, wlg=20.0)["output"] for n, value in enumerate(inputs)
     ]
-    first = filtered([1 / 5.0, 1.0], [1 / 20.0, 1.0], C, inputs[:200])
-    b, a = signal.bilinear([1 / 60.0, 1.0], [1 / 20.0, 1.0], fs=C / 2)
-    second, _ = signal.lfilter(b, a, inputs[200:], zi=signal.lfiltic(b, a, [first[-1]], [inputs[199]]))
-    assert np.max(np.abs(outputs - np.concatenate([first, second]))) < ROUNDED
+    before, after = (signal.bilinear([1 / wld, 1.0], [1 / 20.0, 1.0], fs=C / 2) for wld in (5.0, 60.0))
+    assert np.max(np.abs(outputs - changed(before, after, inputs))) < ROUNDED
 
 
 def test_a_settled_output_stays_when_the_frequencies_change():
@@ -219,26 +210,3 @@ def test_a_variable_frequency_is_limited_before_the_ratio_is_taken():
     block.scan(input=0, wld=0.0, wlg=0.01)
     assert block.error == LIMITED
     assert in_force(block, (0.001, 0.01), wld=0.0, wlg=0.01)
-
-
-@pytest.mark.parametrize("target", list(Platform))
-def test_runs_everywhere(target):
-    text = task("CALL LEAD_LAG(INPUT=A%, WLD=1.0, WLG=5.0, OUTPUT=B%)")
-    assert errors_of(text, target=target, tick_ns=500_000) == []
-
-
-@pytest.mark.parametrize(
-    ("parameters", "code"),
-    [
-        ("INPUT=5, WLD=1.0, WLG=5.0, OUTPUT=B%", "AMX4075"),
-        ("INPUT=A%, WLD=1.0, WLG=5.0, WM=R, OUTPUT=B%", "AMX4076"),
-        ("INPUT=A%, WLG=5.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, WLD=1.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, WLD=1.0, WLG=5.0", "AMX4074"),
-        ("INPUT=A%, WLD=1, WLG=5.0, OUTPUT=B%", "AMX2016"),
-        ("INPUT=A%, WLD=R, WLG=5.0, WM=10.0, INITIAL_VALUE=-5, RESET=X@, OUTPUT=B%", None),
-        ("INPUT=T%(3), WLD=R, WLG=R, INITIAL_VALUE=C%, RESET=-X@, OUTPUT=B%", None),
-    ],
-)
-def test_how_parameters_may_be_written(parameters, code):
-    assert errors_of(task(f"CALL LEAD_LAG({parameters})")) == ([] if code is None else [code])

@@ -6,20 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.blocks.declare.instance import InstanceError
-from automax_ros.core.diagnostics import Severity
-from blocks.support import TICK, int16, mapping_constant, outputs_of, repeatable, run, signals
+from blocks.support import TICK, changed, int16, mapping_constant, outputs_of, repeatable, run, signals
 
 ROUNDED = 0.5 + 1e-4
-
-
-def errors_of(text, **options):
-    """The codes of the errors; a UDC task without THERMAL_OVERLOAD, say, has a warning besides."""
-    return [item.code for item in problems(text, **options) if item.severity is Severity.ERROR]
 
 
 def coefficients(q, wn, period_s):
@@ -140,11 +132,8 @@ def test_changed_coefficients_act_on_the_histories():
         block.scan(input=int(value), q_factor=1.0 if n < 200 else 5.0, wn=20.0 if n < 200 else 60.0)["output"]
         for n, value in enumerate(inputs)
     ]
-    first = signal.lfilter(*coefficients(1.0, 20.0, 0.0055), inputs[:200])
-    b, a = coefficients(5.0, 60.0, 0.0055)
-    state = signal.lfiltic(b, a, first[:-3:-1], inputs[199:197:-1])
-    second, _ = signal.lfilter(b, a, inputs[200:], zi=state)
-    assert np.max(np.abs(outputs - np.concatenate([first, second]))) < ROUNDED
+    expected = changed(coefficients(1.0, 20.0, 0.0055), coefficients(5.0, 60.0, 0.0055), inputs)
+    assert np.max(np.abs(outputs - expected)) < ROUNDED
 
 
 @repeatable
@@ -152,32 +141,6 @@ def test_changed_coefficients_act_on_the_histories():
 def test_any_signal_against_scipy(inputs, q, wn):
     outputs = outputs_of(run("NOTCH", q_factor=q, wn=wn), inputs)
     assert np.max(np.abs(outputs - reference(q, wn, inputs))) < ROUNDED
-
-
-CALL = "CALL NOTCH(INPUT=A%, Q_FACTOR=1.0, WN=10.0, OUTPUT=B%)"
-
-
-@pytest.mark.parametrize(("target", "found"), [(p, ["AMX4071"] if p is Platform.UDC else []) for p in Platform])
-def test_does_not_run_on_a_udc(target, found):
-    assert errors_of(task(CALL), target=target, tick_ns=500_000) == found
-
-
-@pytest.mark.parametrize(
-    ("parameters", "code"),
-    [
-        ("INPUT=5, Q_FACTOR=1.0, WN=10.0, OUTPUT=B%", "AMX4075"),
-        ("INPUT=A%, WN=10.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, Q_FACTOR=1.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=10.0", "AMX4074"),
-        ("INPUT=A%, Q_FACTOR=1, WN=10.0, OUTPUT=B%", "AMX2016"),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=10, OUTPUT=B%", "AMX2016"),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=10.0, INITIAL_VALUE=5, OUTPUT=B%", "AMX4072"),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=10.0, WM=10.0, OUTPUT=B%", "AMX4072"),
-        ("INPUT=T%(3), Q_FACTOR=R, WN=R, RESET=-X@, OUTPUT=B%", None),
-    ],
-)
-def test_how_parameters_may_be_written(parameters, code):
-    assert errors_of(task(f"CALL NOTCH({parameters})")) == ([] if code is None else [code])
 
 
 @pytest.mark.parametrize("literals", [{"q_factor": 0.49, "wn": 10.0}, {"q_factor": 1.0, "wn": 115.0}])

@@ -6,24 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.blocks.declare.instance import InstanceError
-from automax_ros.core.diagnostics import Severity
-from blocks.support import int16, mapping_constant, outputs_of, repeatable, run, signals
+from blocks.support import changed, int16, mapping_constant, outputs_of, repeatable, run, signals
 
 MS = 1_000_000
 ROUNDED = 0.5 + 1e-4
 LOWEST = {2: 0.02, 4: 0.3}
 """Low limit of WN T by the order (48.1)."""
-UDC = {"target": Platform.UDC, "tick_ns": 500_000}
-
-
-def errors_of(text, **options):
-    """The codes of the errors; a UDC task without THERMAL_OVERLOAD, say, has a warning besides."""
-    return [item.code for item in problems(text, **options) if item.severity is Severity.ERROR]
 
 
 def coefficients(order, q, wn, period_s=0.001):
@@ -144,11 +135,8 @@ def test_changed_coefficients_act_on_the_histories(order):
         block.scan(input=int(value), q_factor=1.0 if n < 200 else 2.0, wn=350.0 if n < 200 else 600.0)["output"]
         for n, value in enumerate(inputs)
     ]
-    first = signal.lfilter(*coefficients(order, 1.0, 350.0), inputs[:200])
-    b, a = coefficients(order, 2.0, 600.0)
-    state = signal.lfiltic(b, a, first[: -order - 1 : -1], inputs[199 : 199 - order : -1])
-    second, _ = signal.lfilter(b, a, inputs[200:], zi=state)
-    assert np.max(np.abs(outputs - np.concatenate([first, second]))) < ROUNDED
+    expected = changed(coefficients(order, 1.0, 350.0), coefficients(order, 2.0, 600.0), inputs)
+    assert np.max(np.abs(outputs - expected)) < ROUNDED
 
 
 @repeatable
@@ -161,35 +149,6 @@ def test_changed_coefficients_act_on_the_histories(order):
 def test_any_signal_against_scipy(order, inputs, q, turn):
     outputs = outputs_of(notch(order, q, turn / 0.001), inputs)
     assert np.max(np.abs(outputs - reference(order, q, turn / 0.001, 0.001, inputs))) < ROUNDED
-
-
-@pytest.mark.parametrize("target", list(Platform))
-def test_runs_on_a_udc_alone(target):
-    text = task("CALL NOTCHN(INPUT=A%, Q_FACTOR=1.0, WN=200.0, OUTPUT=B%)")
-    assert errors_of(text, target=target, tick_ns=500_000) == ([] if target is Platform.UDC else ["AMX4071"])
-
-
-@pytest.mark.parametrize(
-    ("parameters", "code"),
-    [
-        ("INPUT=5, Q_FACTOR=1.0, WN=200.0, OUTPUT=B%", None),
-        ("INPUT=A%, Q_FACTOR=R, WN=R, ORDER=4, INITIAL_VALUE=7, RESET=X@, OUTPUT=B%", None),
-        ("INPUT=T%(2), Q_FACTOR=R, WN=R, ORDER=2, INITIAL_VALUE=C%, RESET=-X@, OUTPUT=B%", None),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=200.0, ORDER=1, OUTPUT=B%", "AMX4080"),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=200.0, ORDER=3, OUTPUT=B%", "AMX4080"),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=200.0, ORDER=C%, OUTPUT=B%", "AMX4076"),
-        ("INPUT=A%, Q_FACTOR=1, WN=200.0, OUTPUT=B%", "AMX2016"),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=200, OUTPUT=B%", "AMX2016"),
-        ("INPUT=A%, Q_FACTOR=A%, WN=200.0, OUTPUT=B%", "AMX2015"),
-        ("INPUT=A%, WN=200.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, Q_FACTOR=1.0, OUTPUT=B%", "AMX4074"),
-        ("Q_FACTOR=1.0, WN=200.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, Q_FACTOR=1.0, WN=200.0", "AMX4074"),
-    ],
-)
-def test_how_parameters_may_be_written(parameters, code):
-    """Q_FACTOR is REAL by the text; the % of the printed statement is a misprint."""
-    assert errors_of(task(f"CALL NOTCHN({parameters})"), **UDC) == ([] if code is None else [code])
 
 
 @pytest.mark.parametrize(

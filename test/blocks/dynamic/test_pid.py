@@ -7,22 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.blocks.declare.instance import InstanceError
-from automax_ros.core.diagnostics import Severity
 from blocks.support import int16, repeatable, run
 
 LIMITED = 7004
 LARGEST = 9.2233717e18
 PERIOD = 11_000_000
-
-
-def errors_of(text, **options):
-    """The codes of the errors; a UDC task without THERMAL_OVERLOAD, say, has a warning besides."""
-    return [item.code for item in problems(text, **options) if item.severity is Severity.ERROR]
 
 
 @dataclasses.dataclass
@@ -407,49 +399,6 @@ def test_cancelling_the_plants_pole_makes_the_loop_first_order():
     t = np.arange(len(shown)) * 0.011
     assert np.max(np.abs(shown - 4000 * (1 - np.exp(-t / 0.5)))) < 40
     assert np.max(shown) < 4000 + 3
-
-
-CALL = "LOOP_TIME=0.05, INPUT=A%, FEEDBACK=B%, OUTPUT=C%"
-
-
-@pytest.mark.parametrize("target", list(Platform))
-def test_does_not_run_on_a_udc(target):
-    expected = ["AMX4071"] if target is Platform.UDC else []
-    assert errors_of(task(f"CALL PID(KP=1.0, KI=1.0, {CALL})"), target=target, tick_ns=500_000) == expected
-
-
-@pytest.mark.parametrize(
-    ("parameters", "code"),
-    [
-        (f"KP=R, KI=R, KD=R, ISA=TRUE, ACTION=ON, DERIVATIVE=FALSE, MANUAL=X@, {CALL}", None),
-        (f"KP=1.0, KI=1.0, MANUAL=TRUE, INITIAL_VALUE=5, FEED_FORWARD=D%, MAX_CHANGE=1, DEAD_BAND=0, {CALL}", None),
-        (f"KP=0.0, KI=0.0, KD=0.0, HOLD_PLUS=X@, HOLD_MINUS=-X@, DEAD_BAND=D%, MAX_CHANGE=D%, {CALL}", None),
-        (f"KP=1.0, KI=1.0, LIMIT_PLUS=D%, LIMIT_MINUS=-5, SATURATED_PLUS=X@, ERROR=D%, {CALL}", None),
-        (f"KP=1.0, KI=1.0, ISA=X@, {CALL}", "AMX4076"),
-        (f"KP=1.0, KI=1.0, ACTION=X@, {CALL}", "AMX4076"),
-        (f"KP=1.0, KI=1.0, DERIVATIVE=X@, {CALL}", "AMX4076"),
-        (f"KP=1.0, KI=1.0, {CALL.replace('0.05', 'R')}", "AMX4076"),
-        (f"KP=1.0, KI=1.0, {CALL.replace('0.05', '1')}", "AMX2016"),
-        (f"KP=1, KI=1.0, {CALL}", "AMX2016"),
-        (f"KP=1.0, KI=1, {CALL}", "AMX2016"),
-        (f"KP=1.0, KI=1.0, KD=1, {CALL}", "AMX2016"),
-        (f"KP=1.0, KI=1.0, {CALL.replace('INPUT=A%', 'INPUT=5')}", "AMX4075"),
-        (f"KP=1.0, KI=1.0, {CALL.replace('FEEDBACK=B%', 'FEEDBACK=5')}", "AMX4075"),
-        (f"KP=1.0, KI=1.0, HOLD_PLUS=TRUE, {CALL}", "AMX4075"),
-        (f"KP=1.0, KI=1.0, HOLD_MINUS=FALSE, {CALL}", "AMX4075"),
-        (f"KP=1.0, KI=1.0, DEAD_BAND=-1, {CALL}", "AMX4080"),
-        (f"KP=1.0, KI=1.0, MAX_CHANGE=0, {CALL}", "AMX4080"),
-        (f"KI=1.0, {CALL}", "AMX4074"),
-        (f"KP=1.0, {CALL}", "AMX4074"),
-        (f"KP=1.0, KI=1.0, {CALL.replace('LOOP_TIME=0.05, ', '')}", "AMX4074"),
-        (f"KP=1.0, KI=1.0, {CALL.replace('INPUT=A%, ', '')}", "AMX4074"),
-        (f"KP=1.0, KI=1.0, {CALL.replace('FEEDBACK=B%, ', '')}", "AMX4074"),
-        (f"KP=1.0, KI=1.0, {CALL.replace(', OUTPUT=C%', '')}", "AMX4074"),
-    ],
-)
-def test_how_parameters_may_be_written(parameters, code):
-    text = task(f"CALL PID({parameters})", declare="LOCAL A%, B%, C%, D%, R, X@")
-    assert errors_of(text) == ([] if code is None else [code])
 
 
 @pytest.mark.parametrize(

@@ -2,20 +2,12 @@ import math
 
 import numpy as np
 import pytest
-from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declare.declaration import Platform
-from automax_ros.core.diagnostics import Severity
 from blocks.support import TICK, filtered, mapping_constant, outputs_of, run, signals
 
 C = mapping_constant(0.0055)
 ROUNDED = 0.5 + 1e-6
-
-
-def errors_of(text, **options):
-    """The codes of the errors; a UDC task without THERMAL_OVERLOAD, say, has a warning besides."""
-    return [item.code for item in problems(text, **options) if item.severity is Severity.ERROR]
 
 
 @pytest.mark.parametrize("name", ["steps", "sine", "noise"])
@@ -216,27 +208,3 @@ def test_a_lead_on_the_plants_pole_makes_the_loop_first_order():
     t = np.arange(len(shown)) * 0.0055
     assert np.max(np.abs(shown - 1500 * (1 - np.exp(-t / 0.5)))) < 12
     assert np.max(shown) < 1500 + 3
-
-
-@pytest.mark.parametrize("target", list(Platform))
-def test_runs_everywhere(target):
-    text = task("CALL PROP_INT(INPUT=A%, KP=1.0, WLD=1.0, OUTPUT=B%)")
-    assert errors_of(text, target=target, tick_ns=500_000) == []
-
-
-@pytest.mark.parametrize(
-    ("parameters", "code"),
-    [
-        ("INPUT=5, KP=1.0, WLD=1.0, OUTPUT=B%", None),
-        ("INPUT=A%, KP=R, WLD=R, WM=10.0, LIMIT_PLUS=C%, LIMIT_MINUS=-5, HOLD_PLUS=-X@, OUTPUT=B%", None),
-        ("INPUT=A%, KP=1.0, WLD=1.0, WM=R, OUTPUT=B%", "AMX4076"),
-        ("INPUT=A%, KP=1, WLD=1.0, OUTPUT=B%", "AMX2016"),
-        ("INPUT=A%, KP=1.0, WLD=1, OUTPUT=B%", "AMX2016"),
-        ("INPUT=A%, WLD=1.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, KP=1.0, OUTPUT=B%", "AMX4074"),
-        ("KP=1.0, WLD=1.0, OUTPUT=B%", "AMX4074"),
-        ("INPUT=A%, KP=1.0, WLD=1.0", "AMX4074"),
-    ],
-)
-def test_how_parameters_may_be_written(parameters, code):
-    assert errors_of(task(f"CALL PROP_INT({parameters})")) == ([] if code is None else [code])

@@ -13,56 +13,41 @@ from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.parse.parser import parse
 from automax_ros.language.printer import numbered, print_module
 from automax_ros.language.program import OpenedFile
-from automax_ros.language.tree.basic_tree import (
-    ITEM_TYPES,
-    Close,
-    Delay,
-    Direction,
-    Get,
-    InputFile,
-    OpenChannel,
-    OpenPort,
-    PrintFile,
-    Put,
-    StartEvery,
-    Unit,
-    WaitOn,
-)
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.task_kind import NotATask, TaskKind, kind_of_file
-from automax_ros.language.tree.tree import Module, SetEvent
 from language.random_trees import EXPRESSIONS, LINES, TARGETS, WORDS
 
 FILES = st.integers(0, 300)
-TYPES = st.lists(st.sampled_from([*ITEM_TYPES.values()]), min_size=1, max_size=5).map(tuple)
-UNITS = st.sampled_from(Unit)
+TYPES = st.lists(st.sampled_from([*tree.ITEM_TYPES.values()]), min_size=1, max_size=5).map(tuple)
+UNITS = st.sampled_from(tree.Unit)
 JUMPS = st.none() | LINES
 
 
-def printed(number: int, items: list, full: int | None) -> PrintFile:
-    return PrintFile(number, tuple(items), (*[","] * (len(items) - 1), "") if items else (), full)
+def printed(number: int, items: list, full: int | None) -> tree.PrintFile:
+    return tree.PrintFile(number, tuple(items), (*[","] * (len(items) - 1), "") if items else (), full)
 
 
 WAITING = st.one_of(
-    st.builds(SetEvent, WORDS),
-    st.builds(WaitOn, WORDS),
-    st.builds(Delay, EXPRESSIONS, UNITS),
-    st.builds(StartEvery, EXPRESSIONS, UNITS),
-    st.builds(OpenChannel, st.just(Direction.OUTPUT), FILES, TYPES),
-    st.builds(OpenChannel, st.just(Direction.INPUT), FILES, TYPES, EXPRESSIONS),
-    st.builds(OpenPort, st.sampled_from(["PORTA", "PORTB", "x"]), FILES, EXPRESSIONS, st.none() | EXPRESSIONS),
-    st.builds(OpenPort, st.just("PORTB"), FILES, access=st.sampled_from(["EXCLUSIVE", "NON_EXCLUSIVE"])),
-    st.builds(Close, FILES),
-    st.builds(InputFile, FILES, st.lists(TARGETS, min_size=1, max_size=3).map(tuple), JUMPS),
+    st.builds(tree.SetEvent, WORDS),
+    st.builds(tree.WaitOn, WORDS),
+    st.builds(tree.Delay, EXPRESSIONS, UNITS),
+    st.builds(tree.StartEvery, EXPRESSIONS, UNITS),
+    st.builds(tree.OpenChannel, st.just(tree.Direction.OUTPUT), FILES, TYPES),
+    st.builds(tree.OpenChannel, st.just(tree.Direction.INPUT), FILES, TYPES, EXPRESSIONS),
+    st.builds(tree.OpenPort, st.sampled_from(["PORTA", "PORTB", "x"]), FILES, EXPRESSIONS, st.none() | EXPRESSIONS),
+    st.builds(tree.OpenPort, st.just("PORTB"), FILES, access=st.sampled_from(["EXCLUSIVE", "NON_EXCLUSIVE"])),
+    st.builds(tree.Close, FILES),
+    st.builds(tree.InputFile, FILES, st.lists(TARGETS, min_size=1, max_size=3).map(tuple), JUMPS),
     st.builds(printed, FILES, st.lists(EXPRESSIONS, max_size=3), JUMPS),
-    st.builds(Get, FILES, TARGETS, JUMPS),
-    st.builds(Put, FILES, EXPRESSIONS),
+    st.builds(tree.Get, FILES, TARGETS, JUMPS),
+    st.builds(tree.Put, FILES, EXPRESSIONS),
 )
 
 
 @given(st.lists(WAITING, min_size=1, max_size=4))
 @settings(max_examples=150, deadline=None, derandomize=True, database=None)
 def test_a_tree_of_these_statements_parses_back_to_itself(statements) -> None:
-    module = numbered(Module(tuple(statements)))
+    module = numbered(tree.Module(tuple(statements)))
     text = print_module(module)
     again, found = parse(SourceText("TASK.BAS", text))
     assert [item.message for item in found if "lower case" not in item.message] == []
@@ -162,7 +147,7 @@ def test_the_program_knows_what_it_opens() -> None:
     assert program is not None
     assert program.kind is TaskKind.BASIC
     assert [(item.number, item.words) for item in program.files] == [(1, "a channel FOR INPUT"), (2, "port PORTB")]
-    assert program.files[0] == OpenedFile(1, "", Direction.INPUT, (ITEM_TYPES["I"], ITEM_TYPES["S"]))
+    assert program.files[0] == OpenedFile(1, "", tree.Direction.INPUT, (tree.ITEM_TYPES["I"], tree.ITEM_TYPES["S"]))
     assert (program.startup, program.ticks, program.event) == ((), 0, None)
 
 

@@ -4,45 +4,11 @@ import pytest
 
 from automax_ros.core.diagnostics import SourceText, Span
 from automax_ros.language.parse.parser import parse
-from automax_ros.language.tree.tree import (
-    Argument,
-    Assignment,
-    Binary,
-    BooleanLiteral,
-    Call,
-    ClearErrorLog,
-    Data,
-    Declaration,
-    Declared,
-    Element,
-    End,
-    Event,
-    For,
-    FunctionCall,
-    Gosub,
-    Goto,
-    If,
-    IntegerLiteral,
-    IoWrite,
-    Label,
-    OnJump,
-    Print,
-    Read,
-    RealLiteral,
-    Reference,
-    Remark,
-    Restore,
-    Return,
-    Scope,
-    Stop,
-    StringLiteral,
-    Tuning,
-    Unary,
-)
+from automax_ros.language.tree import tree
 from language.parser_support import codes_of, module_of, statements_of
 
-A, B, C, FLAG = Reference("A%"), Reference("B%"), Reference("C%"), Reference("FLAG@")
-ONE, TWO = IntegerLiteral(1), IntegerLiteral(2)
+A, B, C, FLAG = tree.Reference("A%"), tree.Reference("B%"), tree.Reference("C%"), tree.Reference("FLAG@")
+ONE, TWO = tree.IntegerLiteral(1), tree.IntegerLiteral(2)
 MANUAL = {
     "AND": """10 CALL AND (INPUT1=input1@,           &
           INPUT2=input2@,           &
@@ -133,7 +99,7 @@ def test_statement_forms_of_the_manual(block: str) -> None:
     module, problems = parse(SourceText("TASK.BLK", text))
     assert [item.code for item in problems] == ["AMX0003"]
     (call,) = module.statements
-    assert isinstance(call, Call)
+    assert isinstance(call, tree.Call)
     assert call.block == block
     keywords = [part.split()[-1] for part in text.replace("(", " ").split("=")[:-1]]
     assert [argument.keyword for argument in call.arguments] == keywords
@@ -146,11 +112,11 @@ def test_scan_loop_on_an_event_of_section_4() -> None:
 1000 CALL SCAN_LOOP(TICKS=4, EVENT=START_TASK)
 """
     assert statements_of(text) == (
-        Declaration(Scope.COMMON, (Declared("ISCR%"),), number=100),
-        Event("START_TASK", Reference("ISCR%"), 6, number=500),
-        Call(
+        tree.Declaration(tree.Scope.COMMON, (tree.Declared("ISCR%"),), number=100),
+        tree.Event("START_TASK", tree.Reference("ISCR%"), 6, number=500),
+        tree.Call(
             "SCAN_LOOP",
-            (Argument("TICKS", IntegerLiteral(4)), Argument("EVENT", Reference("START_TASK"))),
+            (tree.Argument("TICKS", tree.IntegerLiteral(4)), tree.Argument("EVENT", tree.Reference("START_TASK"))),
             number=1000,
         ),
     )
@@ -166,39 +132,47 @@ def test_block_equations_of_section_35_1() -> None:
 50 END_IF
 """
 
-    def lost(name: str) -> Binary:
-        return Binary("=", Reference(name), BooleanLiteral(True))
+    def lost(name: str) -> tree.Binary:
+        return tree.Binary("=", tree.Reference(name), tree.BooleanLiteral(True))
 
     assert statements_of(text) == (
-        If(
-            Binary("OR", Binary("OR", lost("XXX_OVERSPD@"), lost("XXX_TACH_LOSS@")), lost("XXX_AVFB_LOSS@")),
-            (Assignment(Reference("XXX_SPD_ESTOP@"), BooleanLiteral(True), number=20), Label(number=30)),
-            (Assignment(Reference("XXX_SPD_ESTOP@"), BooleanLiteral(False), number=40),),
+        tree.If(
+            tree.Binary("OR", tree.Binary("OR", lost("XXX_OVERSPD@"), lost("XXX_TACH_LOSS@")), lost("XXX_AVFB_LOSS@")),
+            (
+                tree.Assignment(tree.Reference("XXX_SPD_ESTOP@"), tree.BooleanLiteral(True), number=20),
+                tree.Label(number=30),
+            ),
+            (tree.Assignment(tree.Reference("XXX_SPD_ESTOP@"), tree.BooleanLiteral(False), number=40),),
             number=10,
         ),
-        Label(number=50),
+        tree.Label(number=50),
     )
 
 
 DECLARED = {
-    "LOCAL A%, B%": (Scope.LOCAL, (Declared("A%"), Declared("B%"))),
-    "COMMON ARRAY1@(10)": (Scope.COMMON, (Declared("ARRAY1@", (10,)),)),
-    "GLOBAL B%(6, 3)": (Scope.COMMON, (Declared("B%", (6, 3)),)),
-    "LOCAL T(1,2,3,4)": (Scope.LOCAL, (Declared("T", (1, 2, 3, 4)),)),
-    "LOCAL A%[3]": (Scope.LOCAL, (Declared("A%", (3,)),)),
-    "LOCAL A$:50, A$:10(20)": (Scope.LOCAL, (Declared("A$", (), 50), Declared("A$", (20,), 10))),
+    "LOCAL A%, B%": (tree.Scope.LOCAL, (tree.Declared("A%"), tree.Declared("B%"))),
+    "COMMON ARRAY1@(10)": (tree.Scope.COMMON, (tree.Declared("ARRAY1@", (10,)),)),
+    "GLOBAL B%(6, 3)": (tree.Scope.COMMON, (tree.Declared("B%", (6, 3)),)),
+    "LOCAL T(1,2,3,4)": (tree.Scope.LOCAL, (tree.Declared("T", (1, 2, 3, 4)),)),
+    "LOCAL A%[3]": (tree.Scope.LOCAL, (tree.Declared("A%", (3,)),)),
+    "LOCAL A$:50, A$:10(20)": (tree.Scope.LOCAL, (tree.Declared("A$", (), 50), tree.Declared("A$", (20,), 10))),
     "LOCAL GAIN [CURRENT=1.5, HIGH=10.0, LOW=-1.0, STEP=0.1]": (
-        Scope.LOCAL,
+        tree.Scope.LOCAL,
         (
-            Declared(
+            tree.Declared(
                 "GAIN",
-                tuning=Tuning(RealLiteral(1.5), RealLiteral(10.0), Unary("-", RealLiteral(1.0)), RealLiteral(0.1)),
+                tuning=tree.Tuning(
+                    tree.RealLiteral(1.5),
+                    tree.RealLiteral(10.0),
+                    tree.Unary("-", tree.RealLiteral(1.0)),
+                    tree.RealLiteral(0.1),
+                ),
             ),
         ),
     ),
     "LOCAL N% [STEP=1, CURRENT=5], B%": (
-        Scope.LOCAL,
-        (Declared("N%", tuning=Tuning(IntegerLiteral(5), step=ONE)), Declared("B%")),
+        tree.Scope.LOCAL,
+        (tree.Declared("N%", tuning=tree.Tuning(tree.IntegerLiteral(5), step=ONE)), tree.Declared("B%")),
     ),
 }
 
@@ -206,47 +180,49 @@ DECLARED = {
 @pytest.mark.parametrize("text", DECLARED)
 def test_declarations(text: str) -> None:
     scope, variables = DECLARED[text]
-    assert statements_of(f"10 {text}") == (Declaration(scope, variables, number=10),)
+    assert statements_of(f"10 {text}") == (tree.Declaration(scope, variables, number=10),)
 
 
 SIMPLE = {
-    "A% = 1": Assignment(A, ONE),
-    "LET A% = 1": Assignment(A, ONE),
-    "LET ARRAY1@(0) = TRUE": Assignment(Element("ARRAY1@", (IntegerLiteral(0),)), BooleanLiteral(True)),
-    "A%[B%, 2] = 1": Assignment(Element("A%", (B, TWO)), ONE),
-    "SPEED = 1": Assignment(Reference("SPEED"), ONE),
-    "SPEED(1) = 1": Assignment(Element("SPEED", (ONE,)), ONE),
-    "SPEED(A = 1) = 1": Assignment(Element("SPEED", (Binary("=", Reference("A"), ONE),)), ONE),
-    "X! = 1": Assignment(Reference("X!"), ONE),
-    "GOTO 200": Goto(200),
-    "GOSUB 200": Gosub(200),
-    "RETURN": Return(),
-    "ON A% + 1 GOTO 100, 200": OnJump(Binary("+", A, ONE), (100, 200)),
-    "ON A% GOSUB 100": OnJump(A, (100,), True),
-    "A@ = ON": Assignment(Reference("A@"), BooleanLiteral(True)),
-    "A@ = OFF": Assignment(Reference("A@"), BooleanLiteral(False)),
-    "READ A%, T%(1)": Read((A, Element("T%", (ONE,)))),
-    'DATA 1, -2, "X", ON, 0FFH': Data(
-        (ONE, Unary("-", TWO), StringLiteral("X"), BooleanLiteral(True), IntegerLiteral(255, True))
+    "A% = 1": tree.Assignment(A, ONE),
+    "LET A% = 1": tree.Assignment(A, ONE),
+    "LET ARRAY1@(0) = TRUE": tree.Assignment(
+        tree.Element("ARRAY1@", (tree.IntegerLiteral(0),)), tree.BooleanLiteral(True)
     ),
-    "RESTORE": Restore(),
-    "RESTORE 300": Restore(300),
-    "PRINT": Print(),
-    'PRINT "A"; A%, B%': Print((StringLiteral("A"), A, B), (";", ",", "")),
-    "PRINT A%;": Print((A,), (";",)),
-    "STOP": Stop(),
-    "END": End(),
-    "CLR_ERRLOG": ClearErrorLog(),
-    "IOWRITE 3, 1, A%": IoWrite(IntegerLiteral(3), ONE, A),
-    "EVENT NAME = START": Event("START"),
-    "EVENT NAME = START, TIMEOUT = 6": Event("START", None, 6),
-    "CALL SUMMER()": Call("SUMMER"),
-    "CALL AND(INPUT1 = -FLAG@)": Call("AND", (Argument("INPUT1", Unary("-", FLAG)),)),
-    "CALL LIMIT(INPUT = T%(2))": Call("LIMIT", (Argument("INPUT", Element("T%", (TWO,))),)),
-    "A@ = TST_ERRLOG@": Assignment(Reference("A@"), FunctionCall("TST_ERRLOG@")),
-    "REM a remark \\ with & signs": Remark("a remark \\ with & signs", False),
-    "! a remark": Remark("a remark", True),
-    "!": Remark("", True),
+    "A%[B%, 2] = 1": tree.Assignment(tree.Element("A%", (B, TWO)), ONE),
+    "SPEED = 1": tree.Assignment(tree.Reference("SPEED"), ONE),
+    "SPEED(1) = 1": tree.Assignment(tree.Element("SPEED", (ONE,)), ONE),
+    "SPEED(A = 1) = 1": tree.Assignment(tree.Element("SPEED", (tree.Binary("=", tree.Reference("A"), ONE),)), ONE),
+    "X! = 1": tree.Assignment(tree.Reference("X!"), ONE),
+    "GOTO 200": tree.Goto(200),
+    "GOSUB 200": tree.Gosub(200),
+    "RETURN": tree.Return(),
+    "ON A% + 1 GOTO 100, 200": tree.OnJump(tree.Binary("+", A, ONE), (100, 200)),
+    "ON A% GOSUB 100": tree.OnJump(A, (100,), True),
+    "A@ = ON": tree.Assignment(tree.Reference("A@"), tree.BooleanLiteral(True)),
+    "A@ = OFF": tree.Assignment(tree.Reference("A@"), tree.BooleanLiteral(False)),
+    "READ A%, T%(1)": tree.Read((A, tree.Element("T%", (ONE,)))),
+    'DATA 1, -2, "X", ON, 0FFH': tree.Data(
+        (ONE, tree.Unary("-", TWO), tree.StringLiteral("X"), tree.BooleanLiteral(True), tree.IntegerLiteral(255, True))
+    ),
+    "RESTORE": tree.Restore(),
+    "RESTORE 300": tree.Restore(300),
+    "PRINT": tree.Print(),
+    'PRINT "A"; A%, B%': tree.Print((tree.StringLiteral("A"), A, B), (";", ",", "")),
+    "PRINT A%;": tree.Print((A,), (";",)),
+    "STOP": tree.Stop(),
+    "END": tree.End(),
+    "CLR_ERRLOG": tree.ClearErrorLog(),
+    "IOWRITE 3, 1, A%": tree.IoWrite(tree.IntegerLiteral(3), ONE, A),
+    "EVENT NAME = START": tree.Event("START"),
+    "EVENT NAME = START, TIMEOUT = 6": tree.Event("START", None, 6),
+    "CALL SUMMER()": tree.Call("SUMMER"),
+    "CALL AND(INPUT1 = -FLAG@)": tree.Call("AND", (tree.Argument("INPUT1", tree.Unary("-", FLAG)),)),
+    "CALL LIMIT(INPUT = T%(2))": tree.Call("LIMIT", (tree.Argument("INPUT", tree.Element("T%", (TWO,))),)),
+    "A@ = TST_ERRLOG@": tree.Assignment(tree.Reference("A@"), tree.FunctionCall("TST_ERRLOG@")),
+    "REM a remark \\ with & signs": tree.Remark("a remark \\ with & signs", False),
+    "! a remark": tree.Remark("a remark", True),
+    "!": tree.Remark("", True),
 }
 
 
@@ -265,16 +241,16 @@ def test_if_on_one_line() -> None:
 40 IF FLAG@ THEN A% = 1 \\ B% = 2 ELSE B% = 1 \\ A% = 2
 50 IF FLAG@ THEN IF A@ THEN A% = 1 ELSE A% = 2 ELSE B% = 1
 """
-    one, two = Assignment(A, ONE), Assignment(A, TWO)
+    one, two = tree.Assignment(A, ONE), tree.Assignment(A, TWO)
     assert statements_of(text) == (
-        If(FLAG, (Goto(200),), one_line=True, number=10),
-        If(FLAG, (Goto(200),), one_line=True, number=20),
-        If(FLAG, (one,), (Goto(200),), one_line=True, number=30),
-        If(FLAG, (one, Assignment(B, TWO)), (Assignment(B, ONE), two), one_line=True, number=40),
-        If(
+        tree.If(FLAG, (tree.Goto(200),), one_line=True, number=10),
+        tree.If(FLAG, (tree.Goto(200),), one_line=True, number=20),
+        tree.If(FLAG, (one,), (tree.Goto(200),), one_line=True, number=30),
+        tree.If(FLAG, (one, tree.Assignment(B, TWO)), (tree.Assignment(B, ONE), two), one_line=True, number=40),
+        tree.If(
             FLAG,
-            (If(Reference("A@"), (one,), (two,), one_line=True),),
-            (Assignment(B, ONE),),
+            (tree.If(tree.Reference("A@"), (one,), (two,), one_line=True),),
+            (tree.Assignment(B, ONE),),
             one_line=True,
             number=50,
         ),
@@ -282,7 +258,7 @@ def test_if_on_one_line() -> None:
 
 
 def test_remark_behind_an_if_on_one_line_is_a_statement_of_its_own() -> None:
-    expected = (If(FLAG, (Goto(200),), one_line=True, number=10), Remark("stop", True))
+    expected = (tree.If(FLAG, (tree.Goto(200),), one_line=True, number=10), tree.Remark("stop", True))
     assert statements_of("10 IF FLAG@ THEN 200 ! stop") == expected
     assert statements_of("10 IF FLAG@ THEN 200 \\ ! stop") == expected
 
@@ -297,71 +273,71 @@ def test_if_in_block_form_nests() -> None:
 70 END_IF
 80 END
 """
-    inner = If(Reference("A@"), (Assignment(A, ONE, number=30),), number=20)
+    inner = tree.If(tree.Reference("A@"), (tree.Assignment(A, ONE, number=30),), number=20)
     assert statements_of(text) == (
-        If(
+        tree.If(
             FLAG,
-            (Remark("outer", True), inner, Label(number=40), Label(number=50)),
-            (Assignment(A, TWO, number=60),),
+            (tree.Remark("outer", True), inner, tree.Label(number=40), tree.Label(number=50)),
+            (tree.Assignment(A, TWO, number=60),),
             number=10,
         ),
-        Label(number=70),
-        End(number=80),
+        tree.Label(number=70),
+        tree.End(number=80),
     )
 
 
 def test_for_with_step_and_labels_on_the_lines_of_next() -> None:
     text = "10 FOR A% = 1 TO B% STEP -2\n20 C% = A%\n30 NEXT A%\n40 FOR A% = 1 TO 2 \\ C% = A% \\ NEXT A%\n"
-    body = Assignment(C, A)
+    body = tree.Assignment(C, A)
     assert statements_of(text) == (
-        For(A, ONE, B, Unary("-", TWO), (Assignment(C, A, number=20), Label(number=30)), number=10),
-        For(A, ONE, TWO, None, (body,), number=40),
+        tree.For(A, ONE, B, tree.Unary("-", TWO), (tree.Assignment(C, A, number=20), tree.Label(number=30)), number=10),
+        tree.For(A, ONE, TWO, None, (body,), number=40),
     )
 
 
 def test_several_statements_on_a_line_have_the_number_once() -> None:
     assert statements_of("10 A% = 1 \\ B% = 2 \\! both") == (
-        Assignment(A, ONE, number=10),
-        Assignment(B, TWO),
-        Remark("both", True),
+        tree.Assignment(A, ONE, number=10),
+        tree.Assignment(B, TWO),
+        tree.Remark("both", True),
     )
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("10 A% = X!", Assignment(A, Reference("X!"), number=10)),
-        ("10 A% = X !", Assignment(A, Reference("X"), number=10)),
-        ("10 A% = X!! text", Assignment(A, Reference("X!"), number=10)),
-        ("10 A% = 1! text", Assignment(A, ONE, number=10)),
-        ("10 A% = T%(1)! text", Assignment(A, Element("T%", (ONE,)), number=10)),
-        ("10 X! = 1 !======", Assignment(Reference("X!"), ONE, number=10)),
+        ("10 A% = X!", tree.Assignment(A, tree.Reference("X!"), number=10)),
+        ("10 A% = X !", tree.Assignment(A, tree.Reference("X"), number=10)),
+        ("10 A% = X!! text", tree.Assignment(A, tree.Reference("X!"), number=10)),
+        ("10 A% = 1! text", tree.Assignment(A, ONE, number=10)),
+        ("10 A% = T%(1)! text", tree.Assignment(A, tree.Element("T%", (ONE,)), number=10)),
+        ("10 X! = 1 !======", tree.Assignment(tree.Reference("X!"), ONE, number=10)),
     ],
 )
-def test_exclamation_mark_is_a_type_character_only_behind_a_name(text: str, expected: Assignment) -> None:
+def test_exclamation_mark_is_a_type_character_only_behind_a_name(text: str, expected: tree.Assignment) -> None:
     assert statements_of(text)[0] == expected
 
 
 def test_continuation_joins_lines_and_skips_blank_ones() -> None:
     text = "10 A% = 1 &\n\n  \t \n  + &\n 20\n30 ! a remark &\n   that goes on & \n 3 lines\n40 END\n"
     assert statements_of(text) == (
-        Assignment(A, Binary("+", ONE, IntegerLiteral(20)), number=10),
-        Remark("a remark\nthat goes on\n3 lines", True, number=30),
-        End(number=40),
+        tree.Assignment(A, tree.Binary("+", ONE, tree.IntegerLiteral(20)), number=10),
+        tree.Remark("a remark\nthat goes on\n3 lines", True, number=30),
+        tree.End(number=40),
     )
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_line_ends_and_end_of_file(end: str) -> None:
     text = end.join(["10 A% = 1 &", " + 2", "", "20 END", "\x1a"])
-    expected = (Assignment(A, Binary("+", ONE, TWO), number=10), End(number=20))
+    expected = (tree.Assignment(A, tree.Binary("+", ONE, TWO), number=10), tree.End(number=20))
     assert statements_of(text) == expected
     assert statements_of("\N{ZERO WIDTH NO-BREAK SPACE}" + text) == expected
 
 
 def test_line_number_alone_is_a_label_with_a_warning() -> None:
     module, problems = parse(SourceText("TASK.BLK", "10\n20 END"))
-    assert module.statements == (Label(number=10), End(number=20))
+    assert module.statements == (tree.Label(number=10), tree.End(number=20))
     assert [(item.code, item.statement) for item in problems] == [("AMX0014", 10)]
 
 
@@ -369,9 +345,9 @@ def test_spans_are_the_places_in_the_text() -> None:
     text = "10 A% = 1 \\ B%(2) = A% + 3\n20 CALL X(IN = A%, &\n     OUT = B%)"
     first, second, call = module_of(text).statements
     assert (first.span, second.span, call.span) == (Span(1, 4, 10), Span(1, 13, 27), Span(2, 4, 19))
-    assert isinstance(second, Assignment)
+    assert isinstance(second, tree.Assignment)
     assert second.value.span == Span(1, 21, 27)
-    assert isinstance(call, Call)
+    assert isinstance(call, tree.Call)
     assert [item.span for item in call.arguments] == [Span(2, 11, 18), Span(3, 6, 14)]
 
 

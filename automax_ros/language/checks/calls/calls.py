@@ -57,7 +57,6 @@ def check_call(context: Context, call: Call) -> None:
 
 
 def _elements(context: Context, block: Block, values: Mapping[str, Expression]) -> int:
-    """Return the number of elements of a block's tables, 0 without one."""
     tables = [values[item.name] for item in block.inputs if item.type is Special.TABLE and item.name in values]
     sizes = [elements_of(context, table) for table in tables if isinstance(table, Reference)]
     return sizes[0] or 0 if sizes else 0
@@ -89,7 +88,6 @@ def event_name(call: Call) -> str | None:
 
 
 def _arguments_by_keyword(context: Context, block: Block, call: Call) -> Arguments:
-    """Return the arguments with known keywords and report those given twice."""
     given: Arguments = {}
     for argument in call.arguments:
         parameter = block.parameter(argument.keyword)
@@ -122,8 +120,9 @@ def _check_keywords(context: Context, block: Block, call: Call, given: Collectio
                 check_variable(context, variable)
     for name in missing:
         if name not in meant:
-            place = context.place_of(call.block, call.span)
-            context.report("AMX4074", f"{block.name} needs {name}", place, _missing_hint(block, name))
+            place, item = context.place_of(call.block, call.span), block.parameter(name)
+            meaning = f"{name}: {item.text}" if isinstance(item, Input) else None
+            context.report("AMX4074", f"{block.name} needs {name}", place, meaning)
     return not missing and not strangers
 
 
@@ -137,13 +136,6 @@ def _keyword(context: Context, argument: Argument) -> Span:
     return context.place_of(argument.keyword, argument.span)
 
 
-def _missing_hint(block: Block, name: str) -> str | None:
-    parameter = block.parameter(name)
-    if not isinstance(parameter, Input):
-        return None
-    return f"{name}: {parameter.text}"
-
-
 def _check_rules(
     context: Context, block: Block, call: Call, given: Arguments, values: Mapping[str, Expression]
 ) -> None:
@@ -151,7 +143,8 @@ def _check_rules(
     block_name = context.place_of(call.block, call.span)
     seen = {keyword: _seen_by_rules(context, values.get(keyword)) for keyword in given}
     for rule in block.rules:
-        for fault in rule.faults(seen):
+        fault = rule.fault(seen)
+        if fault is not None:
             at_fault = given[fault.keyword][1].span if fault.keyword in given else None
             context.report(fault.code, f"{block.name}: {fault.message}", at_fault or block_name, rule.text)
 

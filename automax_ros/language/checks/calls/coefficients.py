@@ -60,7 +60,9 @@ def check_coefficients(
         sides = _sides(limit, period, known, ranges)
         if not sides.holds(value.value):
             if block.coefficients.limits_literals:
-                _report_limited(context, limit, value, sides)
+                allowed = _allowed_text(sides, "{:g}")
+                message = f"{limit.parameter} = {value.value:g} is limited to {allowed} and logged at run time"
+                context.report("AMX4098", message, value.span)
             else:
                 _report(context, limit, value, sides, period)
             del known[limit.parameter]
@@ -131,12 +133,6 @@ def _ordinal(number: int) -> str:
     return f"{number}{ending}"
 
 
-def _report_limited(context: Context, limit: Limit, value: IntegerLiteral | RealLiteral, sides: _Sides) -> None:
-    allowed = _allowed_text(sides, "{:g}")
-    message = f"{limit.parameter} = {value.value:g} is limited to {allowed} and logged at run time"
-    context.report("AMX4098", message, value.span)
-
-
 def _report(context: Context, limit: Limit, value: IntegerLiteral | RealLiteral, sides: _Sides, period: float) -> None:
     name, now = limit.parameter, f"T = {period * 1000.0:g} ms"
     if sides.crossed:
@@ -156,7 +152,6 @@ def _report(context: Context, limit: Limit, value: IntegerLiteral | RealLiteral,
 
 
 def _allowed_text(sides: _Sides, number: str) -> str:
-    """Return the limits for a sentence: both, or the one that is known."""
     low, high = sides.low, sides.high
     if low is None or high is None:
         return f"at most {number.format(high)}" if low is None else f"at least {number.format(low)}"

@@ -58,7 +58,10 @@ def checked_structure(context: Context, block: Block, parameter: Input, argument
         return None
     _check_declaration(context, value)
     if block.structure is Access.MAKES:
-        _check_made_once(context, value)
+        first = context.structures[value.name][1]
+        if first != value.span:
+            note = Note("the first SHIFT block is here", first)
+            context.report("AMX4089", f"a second SHIFT block makes {value.name}", value.span, notes=(note,))
     elif value.name not in context.structures:
         hint = context.suggest.hint(value.name, context.structures) or "a SHIFT block of the task must make it"
         context.report("AMX4088", f"no SHIFT block makes the data structure {value.name}", value.span, hint)
@@ -75,13 +78,6 @@ def _check_declaration(context: Context, name: Reference) -> None:
         message = f"{name.name} cannot be a data structure: it is declared as a variable of another kind"
         hint = "a data structure is local to the task and need not be declared"
         context.report("AMX4093", message, name.span, hint, (note,))
-
-
-def _check_made_once(context: Context, name: Reference) -> None:
-    _, first = context.structures[name.name]
-    if first != name.span:
-        note = Note("the first SHIFT block is here", first)
-        context.report("AMX4089", f"a second SHIFT block makes {name.name}", name.span, notes=(note,))
 
 
 def check_channels(context: Context, block: Block, call: Call, given: Collection[str]) -> None:

@@ -6,24 +6,12 @@ from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, S
 from automax_ros.core.types import DataType
 from automax_ros.core.values import range_text, value_text
 from automax_ros.language.checks.calls.data_structures import checked_array, checked_structure, checked_table
-from automax_ros.language.checks.rules.constant_values import fits, hex_hint, literal_of
+from automax_ros.language.checks.rules.constant_values import Literal, fits, hex_hint, literal_of
 from automax_ros.language.checks.rules.context import Context
 from automax_ros.language.checks.rules.expressions import check_expression, check_variable
 from automax_ros.language.checks.rules.statements import check_written
-from automax_ros.language.tree.tree import (
-    Argument,
-    BooleanLiteral,
-    Element,
-    Expression,
-    IntegerLiteral,
-    RealLiteral,
-    Reference,
-    Scope,
-    StringLiteral,
-    Unary,
-)
-
-_Constant = IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral
+from automax_ros.language.tree import tree
+from automax_ros.language.tree.tree import Argument, Expression
 
 
 def checked_value(context: Context, block: Block, parameter: Input | Output, argument: Argument) -> Expression | None:
@@ -62,7 +50,7 @@ def _checked_input(
         _check_literal(context, parameter, kind, literal, value)
         return literal
     variable = _inverted(value) if kind is DataType.BOOLEAN else None
-    if variable is None and isinstance(value, (Reference, Element)):
+    if variable is None and isinstance(value, (tree.Reference, tree.Element)):
         variable = value
     if variable is None:
         _report_expression(context, parameter, kind, value)
@@ -81,7 +69,7 @@ def _checked_output(context: Context, block: Block, parameter: Output, argument:
     elif _inverted(value) is not None:
         hint = "a boolean is inverted where it is used as an input"
         context.report("AMX4079", f"the output {parameter.name} cannot be inverted", value.span, hint)
-    elif not isinstance(value, (Reference, Element)):
+    elif not isinstance(value, (tree.Reference, tree.Element)):
         _report_expression(context, parameter, parameter.type, value)
     else:
         _check_type(context, block, parameter, parameter.type, check_written(context, value), value)
@@ -90,7 +78,7 @@ def _checked_output(context: Context, block: Block, parameter: Output, argument:
 
 def _checked_event(context: Context, argument: Argument) -> Expression | None:
     value = argument.value
-    if not isinstance(value, Reference):
+    if not isinstance(value, tree.Reference):
         context.report("AMX4060", f"{argument.keyword} takes the name of an event", value.span)
         return None
     event = context.events.get(value.name)
@@ -110,7 +98,7 @@ def _check_type(
     parameter: Input | Output,
     wanted: DataType,
     kind: DataType | None,
-    variable: Reference | Element,
+    variable: tree.Reference | tree.Element,
 ) -> None:
     also = parameter.also if isinstance(parameter, Input) else None
     if kind is not None and kind is not wanted and kind is not also:
@@ -120,7 +108,7 @@ def _check_type(
         context.report("AMX2015", message, variable.span, instead or _type_hint(wanted))
         return
     symbol = context.symbols.get(variable.name)
-    if parameter.wants_common and symbol is not None and symbol.scope is not Scope.COMMON:
+    if parameter.wants_common and symbol is not None and symbol.scope is not tree.Scope.COMMON:
         message = f"{parameter.name} should be a COMMON variable, {variable.name} is LOCAL"
         context.report("AMX4096", message, variable.span, "the rack's other tasks and the drive use it")
 
@@ -135,7 +123,7 @@ _CONSTANTS = {
 """Hint on how to write a constant of each type."""
 
 
-def _check_literal(context: Context, parameter: Input, kind: DataType, literal: _Constant, written: Expression) -> None:
+def _check_literal(context: Context, parameter: Input, kind: DataType, literal: Literal, written: Expression) -> None:
     if parameter.form is Form.VARIABLE:
         context.report("AMX4075", f"{parameter.name} takes a variable only, no constant", written.span)
         return
@@ -154,12 +142,16 @@ def _check_literal(context: Context, parameter: Input, kind: DataType, literal: 
         _check_range(context, parameter, literal, written)
 
 
-def _check_range(context: Context, parameter: Input, literal: _Constant, written: Expression) -> None:
+def _check_range(context: Context, parameter: Input, literal: Literal, written: Expression) -> None:
     value = literal.value
     if isinstance(value, (bool, str)):
         return
     if parameter.one_of:
-        _check_choice(context, parameter, value, written)
+        if value not in parameter.one_of:
+            near = sorted(sorted(parameter.one_of, key=lambda item: abs(item - value))[:2])
+            hint = f"the nearest are {' and '.join(str(item) for item in near)}"
+            message = f"{parameter.name} = {value} is none of {', '.join(str(item) for item in parameter.one_of)}"
+            context.report("AMX4080", message, written.span, hint)
         return
     low, high = parameter.low, parameter.high
     if (low is None or low <= value) and (high is None or value <= high):
@@ -171,20 +163,10 @@ def _check_range(context: Context, parameter: Input, literal: _Constant, written
     context.report("AMX4080", f"{parameter.name} = {value_text(value)} is out of range: {bounds}", written.span)
 
 
-def _check_choice(context: Context, parameter: Input, value: float, written: Expression) -> None:
-    if value in parameter.one_of:
-        return
-    near = sorted(parameter.one_of, key=lambda item: abs(item - value))[:2]
-    hint = f"the nearest are {' and '.join(str(item) for item in sorted(near))}"
-    message = f"{parameter.name} = {value} is none of {', '.join(str(item) for item in parameter.one_of)}"
-    context.report("AMX4080", message, written.span, hint)
-
-
 def _report_expression(context: Context, parameter: Input | Output, kind: object, value: Expression) -> None:
-    """Report an expression where a block accepts only a variable or a constant."""
-    operand = value.operand if isinstance(value, Unary) else None
+    operand = value.operand if isinstance(value, tree.Unary) else None
     hint = "assign it to a LOCAL variable first"
-    if isinstance(operand, (Reference, Element)) and operand.type is DataType.BOOLEAN:
+    if isinstance(operand, (tree.Reference, tree.Element)) and operand.type is DataType.BOOLEAN:
         if isinstance(parameter, Output):
             hint = "an output cannot be inverted"
         elif kind is DataType.BOOLEAN:
@@ -198,33 +180,33 @@ def _report_expression(context: Context, parameter: Input | Output, kind: object
     context.report("AMX4077", f"{parameter.name} takes {what}, no expression", value.span, hint)
 
 
-def _inverted(value: Expression) -> Reference | Element | None:
+def _inverted(value: Expression) -> tree.Reference | tree.Element | None:
     """Return the boolean variable of ``-NAME@``, None where the value is something else."""
-    if not isinstance(value, Unary) or value.operator != "-":
+    if not isinstance(value, tree.Unary) or value.operator != "-":
         return None
     operand = value.operand
-    return operand if isinstance(operand, (Reference, Element)) and operand.type is DataType.BOOLEAN else None
+    return operand if isinstance(operand, (tree.Reference, tree.Element)) and operand.type is DataType.BOOLEAN else None
 
 
-def _is_of(literal: _Constant, kind: DataType) -> bool:
-    if isinstance(literal, IntegerLiteral):
+def _is_of(literal: Literal, kind: DataType) -> bool:
+    if isinstance(literal, tree.IntegerLiteral):
         return kind.is_integer
-    if isinstance(literal, RealLiteral):
+    if isinstance(literal, tree.RealLiteral):
         return kind is DataType.REAL
-    return kind is (DataType.BOOLEAN if isinstance(literal, BooleanLiteral) else DataType.STRING)
+    return kind is (DataType.BOOLEAN if isinstance(literal, tree.BooleanLiteral) else DataType.STRING)
 
 
-def _spelling(literal: _Constant) -> str:
+def _spelling(literal: Literal) -> str:
     """Return how a number is written, ``.`` for a constant that is not a number or has no known spelling."""
-    if isinstance(literal, IntegerLiteral):
+    if isinstance(literal, tree.IntegerLiteral):
         return str(literal.value)
-    return literal.text or "." if isinstance(literal, RealLiteral) else "."
+    return literal.text or "." if isinstance(literal, tree.RealLiteral) else "."
 
 
-def _describe(literal: _Constant) -> str:
-    if isinstance(literal, StringLiteral):
+def _describe(literal: Literal) -> str:
+    if isinstance(literal, tree.StringLiteral):
         return "a string"
-    if isinstance(literal, BooleanLiteral):
+    if isinstance(literal, tree.BooleanLiteral):
         return "TRUE" if literal.value else "FALSE"
     return str(literal.value)
 

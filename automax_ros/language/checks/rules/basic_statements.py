@@ -18,21 +18,8 @@ from automax_ros.language.checks.rules.expressions import check_expression, chec
 from automax_ros.language.checks.rules.statements import assignable, check_written
 from automax_ros.language.checks.rules.task_layout import TaskLayout
 from automax_ros.language.program import OpenedFile
-from automax_ros.language.tree.basic_tree import (
-    Close,
-    Delay,
-    Direction,
-    Get,
-    InputFile,
-    OpenChannel,
-    OpenPort,
-    PrintFile,
-    Put,
-    StartEvery,
-    WaitOn,
-)
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.task_kind import TaskKind
-from automax_ros.language.tree.tree import SetEvent, Statement
 
 MAX_FILE = 255
 """Largest number of a channel or a port (J-3675 p. 6-20)."""
@@ -50,7 +37,7 @@ def find_files(context: Context, layout: TaskLayout) -> None:
         context.line = None
         context.report("AMX4119", "a UDC runs no BASIC task", Span(1, 1, 2), "its tasks A and B are .BLK files")
     for statement, line, _ in layout.numbered():
-        if not isinstance(statement, (OpenChannel, OpenPort)):
+        if not isinstance(statement, (tree.OpenChannel, tree.OpenPort)):
             continue
         context.line = line
         opened = _opened(statement)
@@ -64,20 +51,20 @@ def find_files(context: Context, layout: TaskLayout) -> None:
             context.report("AMX4114", message, statement.span, "take another number", (note,))
 
 
-def _opened(statement: OpenChannel | OpenPort) -> OpenedFile:
-    if isinstance(statement, OpenPort):
+def _opened(statement: tree.OpenChannel | tree.OpenPort) -> OpenedFile:
+    if isinstance(statement, tree.OpenPort):
         return OpenedFile(statement.file, statement.port.upper())
     return OpenedFile(statement.file, "", statement.direction, statement.types)
 
 
-def check_waiting(context: Context, statement: Statement) -> None:
+def check_waiting(context: Context, statement: tree.Statement) -> None:
     """Report the faults of one statement of events, times, channels or ports; ignore others."""
     check = _CHECKS.get(type(statement))
     if check is not None:
         check(context, statement)
 
 
-def _check_event(context: Context, statement: SetEvent | WaitOn) -> None:
+def _check_event(context: Context, statement: tree.SetEvent | tree.WaitOn) -> None:
     if context.target is Platform.UDC:
         context.report("AMX4027", "SET cannot be used in a UDC task", statement.span)
     elif statement.event not in context.events and "EVENT" not in context.broken.words:
@@ -86,7 +73,7 @@ def _check_event(context: Context, statement: SetEvent | WaitOn) -> None:
         context.report("AMX4060", f"the event {statement.event} is not declared", place, hint)
 
 
-def _check_set(context: Context, statement: SetEvent) -> None:
+def _check_set(context: Context, statement: tree.SetEvent) -> None:
     _check_event(context, statement)
     event = context.events.get(statement.event)
     if event is not None and event.interrupt_status is not None:
@@ -94,17 +81,17 @@ def _check_set(context: Context, statement: SetEvent) -> None:
         context.report("AMX4121", message, statement.span, "declare a software event: EVENT NAME = name")
 
 
-def _check_time(context: Context, statement: Delay | StartEvery) -> None:
-    word = "DELAY" if isinstance(statement, Delay) else "START EVERY"
+def _check_time(context: Context, statement: tree.Delay | tree.StartEvery) -> None:
+    word = "DELAY" if isinstance(statement, tree.Delay) else "START EVERY"
     check_integer(context, statement.count, "AMX2009", f"the time of {word}")
     value = constant_value(statement.count)
-    least = 0 if isinstance(statement, Delay) else 1
+    least = 0 if isinstance(statement, tree.Delay) else 1
     if isinstance(value, int) and value < least:
         message = f"{word} needs {least} or more, not {value}"
         context.report("AMX4118", message, statement.count.span)
 
 
-def _check_open_channel(context: Context, statement: OpenChannel) -> None:
+def _check_open_channel(context: Context, statement: tree.OpenChannel) -> None:
     _check_number(context, statement.file, statement.span)
     if len(statement.types) > MAX_ITEMS:
         message = f"a message has at most {MAX_ITEMS} items, here {len(statement.types)}"
@@ -117,7 +104,7 @@ def _check_open_channel(context: Context, statement: OpenChannel) -> None:
         context.report("AMX4118", f"DEPTH = {value} is not 1 to {MAX_DEPTH}", statement.depth.span)
 
 
-def _check_open_port(context: Context, statement: OpenPort) -> None:
+def _check_open_port(context: Context, statement: tree.OpenPort) -> None:
     _check_number(context, statement.file, statement.span)
     if statement.port.upper() not in PORTS:
         message = f"{quoted(statement.port)} is not a port: a Processor has PORTA and PORTB"
@@ -144,10 +131,6 @@ def _file(context: Context, number: int, span: Span) -> OpenedFile | None:
     return opened
 
 
-def _check_close(context: Context, statement: Close) -> None:
-    _port(context, statement.file, statement.span, "CLOSE")
-
-
 def _port(context: Context, number: int, span: Span, word: str) -> OpenedFile | None:
     opened = _file(context, number, span)
     if opened is not None and opened.direction is not None:
@@ -157,14 +140,14 @@ def _port(context: Context, number: int, span: Span, word: str) -> OpenedFile | 
     return opened
 
 
-def _check_input(context: Context, statement: InputFile) -> None:
+def _check_input(context: Context, statement: tree.InputFile) -> None:
     kinds = [check_written(context, target) for target in statement.targets]
     opened = _file(context, statement.file, statement.span)
     if opened is None:
         return
-    if opened.direction is Direction.OUTPUT:
+    if opened.direction is tree.Direction.OUTPUT:
         context.report("AMX4116", f"INPUT cannot be: #{statement.file} is {opened.words}", statement.span)
-    elif opened.direction is Direction.INPUT:
+    elif opened.direction is tree.Direction.INPUT:
         if _count_agrees(context, statement.file, opened, len(kinds), statement.span):
             for target, kind, item in zip(statement.targets, kinds, opened.types, strict=True):
                 if kind is not None and not assignable(kind, item):
@@ -174,7 +157,7 @@ def _check_input(context: Context, statement: InputFile) -> None:
         _warn_of_port(context, statement, "INPUT")
 
 
-def _check_get(context: Context, statement: Get) -> None:
+def _check_get(context: Context, statement: tree.Get) -> None:
     kind = check_written(context, statement.target)
     if kind is not None and kind is not DataType.STRING:
         message = f"GET gives a character, {statement.target.name} is {kind.word}"
@@ -183,13 +166,13 @@ def _check_get(context: Context, statement: Get) -> None:
         _warn_of_port(context, statement, "GET")
 
 
-def _warn_of_port(context: Context, statement: InputFile | Get, word: str) -> None:
+def _warn_of_port(context: Context, statement: tree.InputFile | tree.Get, word: str) -> None:
     if statement.empty is None:
         message = f"{word} waits for ever: nothing is connected to a port of the emulator"
         context.report("AMX4120", message, statement.span, f"write {word}:EMPTY=line to go on")
 
 
-def _check_print(context: Context, statement: PrintFile) -> None:
+def _check_print(context: Context, statement: tree.PrintFile) -> None:
     kinds = [check_expression(context, item) for item in statement.items]
     opened = _file(context, statement.file, statement.span)
     if opened is None:
@@ -198,7 +181,7 @@ def _check_print(context: Context, statement: PrintFile) -> None:
         if statement.full is not None:
             message = f"FULL= belongs to a channel, #{statement.file} is {opened.words}"
             context.report("AMX4116", message, statement.span)
-    elif opened.direction is Direction.INPUT:
+    elif opened.direction is tree.Direction.INPUT:
         context.report("AMX4116", f"PRINT cannot be: #{statement.file} is {opened.words}", statement.span)
     elif _count_agrees(context, statement.file, opened, len(kinds), statement.span):
         for item, kind, wanted in zip(statement.items, kinds, opened.types, strict=True):
@@ -215,23 +198,23 @@ def _count_agrees(context: Context, number: int, opened: OpenedFile, count: int,
     return False
 
 
-def _check_put(context: Context, statement: Put) -> None:
+def _check_put(context: Context, statement: tree.Put) -> None:
     kind = check_expression(context, statement.item)
     if kind is not None and kind is not DataType.STRING:
         context.report("AMX4115", f"PUT writes a string, not {kind.word}", statement.item.span, "CHR$(n), STR$(x)")
     _port(context, statement.file, statement.span, "PUT")
 
 
-_CHECKS: dict[type[object], Callable[[Context, Any], None]] = {
-    SetEvent: _check_set,
-    WaitOn: _check_event,
-    Delay: _check_time,
-    StartEvery: _check_time,
-    OpenChannel: _check_open_channel,
-    OpenPort: _check_open_port,
-    Close: _check_close,
-    InputFile: _check_input,
-    Get: _check_get,
-    PrintFile: _check_print,
-    Put: _check_put,
+_CHECKS: dict[type[object], Callable[[Context, Any], object]] = {
+    tree.SetEvent: _check_set,
+    tree.WaitOn: _check_event,
+    tree.Delay: _check_time,
+    tree.StartEvery: _check_time,
+    tree.OpenChannel: _check_open_channel,
+    tree.OpenPort: _check_open_port,
+    tree.Close: lambda context, it: _port(context, it.file, it.span, "CLOSE"),
+    tree.InputFile: _check_input,
+    tree.Get: _check_get,
+    tree.PrintFile: _check_print,
+    tree.Put: _check_put,
 }

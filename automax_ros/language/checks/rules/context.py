@@ -53,7 +53,8 @@ def broken_lines(source: SourceText, diagnostics: Iterable[Diagnostic]) -> Broke
     words: set[str] = set()
     declared: set[str] = set()
     numbers: set[int] = set()
-    faulty = {begins[item.span.line - 1] for item in diagnostics if _stops(item) and item.span.line <= len(lines)}
+    errors = [item for item in diagnostics if item.severity is Severity.ERROR]
+    faulty = {begins[item.span.line - 1] for item in errors if 1 <= item.span.line <= len(lines)}
     for index, line in enumerate(lines):
         if begins[index] not in faulty:
             continue
@@ -66,10 +67,6 @@ def broken_lines(source: SourceText, diagnostics: Iterable[Diagnostic]) -> Broke
         if index == logical and number:
             numbers.add(int(number.group(1)))
     return BrokenLines(frozenset(words), frozenset(declared), frozenset(numbers))
-
-
-def _stops(diagnostic: Diagnostic) -> bool:
-    return diagnostic.severity is Severity.ERROR and diagnostic.span.line >= 1
 
 
 def _beginnings(lines: list[str]) -> list[int]:

@@ -168,7 +168,6 @@ def _dimensions(context: Context, declared: Declared) -> tuple[int, ...]:
 
 
 def _length(context: Context, declared: Declared) -> int:
-    """Return a string's maximum length, 0 for other types."""
     if declared.type is not DataType.STRING:
         if declared.length is not None:
             context.report("AMX4008", f"{declared.name} is not a string and has no length", declared.span)
@@ -200,7 +199,6 @@ def check_storage(context: Context) -> None:
 
 
 def _check_total(context: Context) -> None:
-    """Report the variable that makes the task's data too large."""
     total = 0
     for symbol in context.symbols.values():
         total += min(symbol.elements, MAX_ARRAY_ELEMENTS)

@@ -24,19 +24,8 @@ from automax_ros.language.checks.rules.typing_rules import (
     unary_type,
 )
 from automax_ros.language.program import Symbol
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.functions import FUNCTIONS, Argument, Function, Result
-from automax_ros.language.tree.tree import (
-    Binary,
-    BooleanLiteral,
-    Element,
-    Expression,
-    FunctionCall,
-    IntegerLiteral,
-    RealLiteral,
-    Reference,
-    StringLiteral,
-    Unary,
-)
 
 _SMALLEST = 5e-324
 _BITS = (1, 0, 15, "bits 0 to 15")
@@ -58,13 +47,13 @@ _WORDS = {Argument.NUMBER: "a number", Argument.INTEGER: "an integer", Argument.
 _HEXADECIMAL = re.compile(r"[A-F][0-9A-F]{0,7}H")
 """A name that looks like a hexadecimal constant without its leading 0."""
 _LITERAL_TYPES: dict[type, DataType] = {
-    RealLiteral: DataType.REAL,
-    StringLiteral: DataType.STRING,
-    BooleanLiteral: DataType.BOOLEAN,
+    tree.RealLiteral: DataType.REAL,
+    tree.StringLiteral: DataType.STRING,
+    tree.BooleanLiteral: DataType.BOOLEAN,
 }
 
 
-def check_function(context: Context, call: FunctionCall, types: list[DataType | None]) -> DataType | None:
+def check_function(context: Context, call: tree.FunctionCall, types: list[DataType | None]) -> DataType | None:
     """Report the faults of a call whose arguments have these types, and return the type of its value."""
     function = FUNCTIONS[call.name]
     if context.target.value not in function.targets:
@@ -92,8 +81,7 @@ def _takes(wanted: Argument, kind: DataType) -> bool:
     return kind.is_integer if wanted is Argument.INTEGER else kind.is_numeric
 
 
-def _check_range(context: Context, call: FunctionCall, argument: Expression) -> None:
-    """Report a constant argument that would be logged at run time."""
+def _check_range(context: Context, call: tree.FunctionCall, argument: tree.Expression) -> None:
     place, low, high, text = _RANGES.get(call.name, (-1, 0, 0, ""))
     if place < 0 or call.arguments[place] is not argument:
         return
@@ -109,29 +97,29 @@ def _count(function: Function) -> str:
     return "no arguments" if least == 0 else "1 argument" if least == 1 else f"{least} arguments"
 
 
-def check_expression(context: Context, expression: Expression) -> DataType | None:
+def check_expression(context: Context, expression: tree.Expression) -> DataType | None:
     """Report the faults of an expression and return its type."""
-    if isinstance(expression, Binary):
+    if isinstance(expression, tree.Binary):
         return _check_chain(context, expression)
-    if isinstance(expression, Unary):
+    if isinstance(expression, tree.Unary):
         return _check_unary(context, expression)
-    if isinstance(expression, (Reference, Element)):
+    if isinstance(expression, (tree.Reference, tree.Element)):
         return check_variable(context, expression)
-    if isinstance(expression, IntegerLiteral):
+    if isinstance(expression, tree.IntegerLiteral):
         return _check_integer(context, expression, INT32_MAX)
-    if isinstance(expression, FunctionCall):
+    if isinstance(expression, tree.FunctionCall):
         types = [check_expression(context, argument) for argument in expression.arguments]
         return check_function(context, expression, types)
     return _LITERAL_TYPES[type(expression)]
 
 
-def _report_structure(context: Context, target: Reference | Element) -> None:
+def _report_structure(context: Context, target: tree.Reference | tree.Element) -> None:
     message = f"{target.name} is a data structure: only SHIFT, READ and WRITE blocks can use it"
     note = Note("it is made here", context.structures[target.name][1])
     context.report("AMX4093", message, target.span, notes=(note,))
 
 
-def check_variable(context: Context, target: Reference | Element) -> DataType | None:
+def check_variable(context: Context, target: tree.Reference | tree.Element) -> DataType | None:
     """Report a variable that is not declared, or not used as declared, and return its type.
 
     The type counts as not known where a whole array is used as a value, and where the variable is not declared but one
@@ -141,7 +129,7 @@ def check_variable(context: Context, target: Reference | Element) -> DataType | 
         _report_structure(context, target)
         return target.type
     symbol = context.symbols.get(target.name)
-    for subscript in target.subscripts if isinstance(target, Element) else ():
+    for subscript in target.subscripts if isinstance(target, tree.Element) else ():
         if symbol is None:
             check_expression(context, subscript)
         else:
@@ -149,7 +137,7 @@ def check_variable(context: Context, target: Reference | Element) -> DataType | 
     if symbol is None:
         _report_undeclared(context, target)
         return None if _has_twin(context, target.name) else target.type
-    if isinstance(target, Element):
+    if isinstance(target, tree.Element):
         _check_subscripts(context, target, symbol)
     elif symbol.dimensions:
         hint = f"name one element, such as {target.name}({','.join('0' * len(symbol.dimensions))})"
@@ -158,7 +146,7 @@ def check_variable(context: Context, target: Reference | Element) -> DataType | 
     return target.type
 
 
-def check_integer(context: Context, expression: Expression, code: str, what: str) -> None:
+def check_integer(context: Context, expression: tree.Expression, code: str, what: str) -> None:
     """Report an expression that is not an integer; ``what`` begins the message."""
     kind = check_expression(context, expression)
     if kind is not None and not kind.is_integer:
@@ -166,7 +154,7 @@ def check_integer(context: Context, expression: Expression, code: str, what: str
         context.report(code, f"{what} must be an integer, not {kind.word}", expression.span, hint)
 
 
-def check_boolean(context: Context, condition: Expression) -> None:
+def check_boolean(context: Context, condition: tree.Expression) -> None:
     """Report a condition that is not boolean."""
     kind = check_expression(context, condition)
     if kind is not None and kind is not DataType.BOOLEAN:
@@ -174,7 +162,7 @@ def check_boolean(context: Context, condition: Expression) -> None:
         context.report("AMX2005", f"a condition must be BOOLEAN, this is {kind.word}", condition.span, hint)
 
 
-def _check_integer(context: Context, literal: IntegerLiteral, highest: int) -> DataType | None:
+def _check_integer(context: Context, literal: tree.IntegerLiteral, highest: int) -> DataType | None:
     if literal.value > highest:
         message = f"{literal.value} does not fit in 32 bits"
         context.report("AMX2008", message, literal.span, "an integer is -2147483648 to 2147483647; 2.0E10 is a REAL")
@@ -182,9 +170,9 @@ def _check_integer(context: Context, literal: IntegerLiteral, highest: int) -> D
     return literal_integer_type(literal)
 
 
-def _check_unary(context: Context, expression: Unary) -> DataType | None:
+def _check_unary(context: Context, expression: tree.Unary) -> DataType | None:
     operator, operand = expression.operator, expression.operand
-    if operator == "-" and isinstance(operand, IntegerLiteral):
+    if operator == "-" and isinstance(operand, tree.IntegerLiteral):
         kind = _check_integer(context, operand, INT32_MAX + 1)
     else:
         kind = check_expression(context, operand)
@@ -203,7 +191,7 @@ def _check_unary(context: Context, expression: Unary) -> DataType | None:
     return None
 
 
-def _check_chain(context: Context, expression: Binary) -> DataType | None:
+def _check_chain(context: Context, expression: tree.Binary) -> DataType | None:
     first, operations = spine(expression)
     result = check_expression(context, first)
     for operation in operations:
@@ -213,7 +201,7 @@ def _check_chain(context: Context, expression: Binary) -> DataType | None:
 
 
 def _check_operation(
-    context: Context, operation: Binary, left: DataType | None, right: DataType | None
+    context: Context, operation: tree.Binary, left: DataType | None, right: DataType | None
 ) -> DataType | None:
     operator = operation.operator
     if left is None or right is None:
@@ -227,7 +215,7 @@ def _check_operation(
     return result
 
 
-def _report_operation(context: Context, operation: Binary, left: DataType, right: DataType) -> None:
+def _report_operation(context: Context, operation: tree.Binary, left: DataType, right: DataType) -> None:
     operator, span = operation.operator, operation.span
     if operator in RELATIONAL:
         hint = None
@@ -247,13 +235,13 @@ def _report_operation(context: Context, operation: Binary, left: DataType, right
         context.report("AMX2001", f"{operator} cannot join {left.word} and {right.word}", span, hint)
 
 
-def _report_undeclared(context: Context, target: Reference | Element) -> None:
+def _report_undeclared(context: Context, target: tree.Reference | tree.Element) -> None:
     if context.broken.may_declare(target.name):
         return
     if target.name in context.events:
         context.report("AMX4001", f"{target.name} is an event, not a variable", target.span)
         return
-    known = set(context.symbols) | FUNCTIONS.keys() if isinstance(target, Element) else context.symbols
+    known = set(context.symbols) | FUNCTIONS.keys() if isinstance(target, tree.Element) else context.symbols
     hint = context.suggest.hint(target.name, known)
     context.report("AMX4001", f"{target.name} is not declared", target.span, hint or _undeclared_hint(target.name))
 
@@ -269,7 +257,7 @@ def _has_twin(context: Context, name: str) -> bool:
     return any(bare + kind.value in context.symbols for kind in DataType)
 
 
-def _check_subscripts(context: Context, element: Element, symbol: Symbol) -> None:
+def _check_subscripts(context: Context, element: tree.Element, symbol: Symbol) -> None:
     if not symbol.dimensions:
         context.report("AMX4021", f"{element.name} is a simple variable and has no subscripts", element.span)
         return

@@ -9,26 +9,10 @@ from dataclasses import dataclass
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.language.checks.rules.context import Context
 from automax_ros.language.checks.rules.task_layout import TaskLayout
-from automax_ros.language.tree.basic_tree import PrintFile
-from automax_ros.language.tree.tree import (
-    Data,
-    Declaration,
-    End,
-    Event,
-    Gosub,
-    Goto,
-    If,
-    Label,
-    OnJump,
-    Remark,
-    Restore,
-    Return,
-    Statement,
-    Stop,
-)
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.walk import bodies, jumps_of
 
-_IDLE = (Remark, Data, Declaration, Event, Label)
+_IDLE = (tree.Remark, tree.Data, tree.Declaration, tree.Event, tree.Label)
 """Statements that do nothing when they are reached."""
 
 
@@ -46,7 +30,7 @@ class Place:
 
     region: Region
     blocks: tuple[int, ...]
-    statement: Statement
+    statement: tree.Statement
 
 
 @dataclass(frozen=True)
@@ -96,22 +80,24 @@ def _collect(layout: TaskLayout) -> tuple[dict[int, Place], list[Jump]]:
     return places, jumps
 
 
-def _placed(statements: tuple[Statement, ...], blocks: tuple[int, ...]) -> Iterator[tuple[Statement, tuple[int, ...]]]:
+def _placed(
+    statements: tuple[tree.Statement, ...], blocks: tuple[int, ...]
+) -> Iterator[tuple[tree.Statement, tuple[int, ...]]]:
     for statement in statements:
         yield statement, blocks
         for body in bodies(statement):
             yield from _placed(body, (*blocks, id(body)))
 
 
-def _targets(statement: Statement) -> list[tuple[int, str]]:
-    if isinstance(statement, Goto):
+def _targets(statement: tree.Statement) -> list[tuple[int, str]]:
+    if isinstance(statement, tree.Goto):
         return [(statement.line, "GOTO")]
-    if isinstance(statement, Gosub):
+    if isinstance(statement, tree.Gosub):
         return [(statement.line, "GOSUB")]
-    if isinstance(statement, OnJump):
+    if isinstance(statement, tree.OnJump):
         verb = "ON ... GOSUB" if statement.gosub else "ON ... GOTO"
         return [(line, verb) for line in statement.lines]
-    if isinstance(statement, PrintFile):
+    if isinstance(statement, tree.PrintFile):
         return [(line, "FULL =") for line in jumps_of(statement)]
     return [(line, "EMPTY =") for line in jumps_of(statement)]
 
@@ -124,7 +110,7 @@ def _check_jump(context: Context, jump: Jump, places: dict[int, Place]) -> None:
             context.report("AMX4047", f"there is no line {jump.line} to go to", span, _near_line(jump.line, places))
         return
     note = (Note(f"line {jump.line} is here", place.statement.span),)
-    if isinstance(place.statement, Declaration):
+    if isinstance(place.statement, tree.Declaration):
         context.report("AMX4051", f"line {jump.line} declares variables: nothing is executed there", span, notes=note)
     elif place.region is Region.LOOP or (place.region is Region.STARTUP and _ends_at_scan_loop(jump)):
         where = f"{'is' if place.region is Region.LOOP else 'lies before'} {context.scan_block}"
@@ -145,7 +131,6 @@ def _ends_at_scan_loop(jump: Jump) -> bool:
 
 
 def _near_line(line: int, places: dict[int, Place]) -> str | None:
-    """Return a hint to the next line that exists, None where none follows."""
     following = min((number for number in places if number > line), default=None)
     return None if following is None else f"the next line is {following}"
 
@@ -153,20 +138,19 @@ def _near_line(line: int, places: dict[int, Place]) -> str | None:
 def _check_returns(context: Context, layout: TaskLayout) -> None:
     statements = list(layout.numbered())
     if "GOSUB" in context.broken.words or any(
-        isinstance(item, Gosub) or (isinstance(item, OnJump) and item.gosub) for item, _, _ in statements
+        isinstance(item, tree.Gosub) or (isinstance(item, tree.OnJump) and item.gosub) for item, _, _ in statements
     ):
         return
     for statement, line, _ in statements:
-        if isinstance(statement, Return):
+        if isinstance(statement, tree.Return):
             context.line = line
             context.report("AMX4055", "RETURN in a task without GOSUB", statement.span)
 
 
 def _check_restores(context: Context, layout: TaskLayout, places: dict[int, Place]) -> None:
-    """Report a RESTORE whose line does not exist or has no DATA in it or after it."""
     data = [line or 0 for line, _ in context.data]
     for statement, line, _ in layout.numbered():
-        if not isinstance(statement, Restore) or "DATA" in context.broken.words:
+        if not isinstance(statement, tree.Restore) or "DATA" in context.broken.words:
             continue
         context.line = line
         if not data:
@@ -181,7 +165,7 @@ def _check_restores(context: Context, layout: TaskLayout, places: dict[int, Plac
 
 
 def _check_reached(
-    context: Context, statements: tuple[Statement, ...], targets: frozenset[int], line: int | None
+    context: Context, statements: tuple[tree.Statement, ...], targets: frozenset[int], line: int | None
 ) -> int | None:
     """Report the first statement of each unreachable sequence; return the line number in force at the end."""
     ended: Span | None = None
@@ -201,20 +185,20 @@ def _check_reached(
     return line
 
 
-def _up_to_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+def _up_to_end(statements: tuple[tree.Statement, ...]) -> tuple[tree.Statement, ...]:
     """Return the statements before END; those after it are a separate error."""
-    at = next((index for index, item in enumerate(statements) if isinstance(item, End)), len(statements))
+    at = next((index for index, item in enumerate(statements) if isinstance(item, tree.End)), len(statements))
     return statements[:at]
 
 
-def _leaves(statement: Statement, targets: frozenset[int]) -> bool:
+def _leaves(statement: tree.Statement, targets: frozenset[int]) -> bool:
     """Return whether the statement that follows can only be reached by a jump."""
-    if isinstance(statement, If):
+    if isinstance(statement, tree.If):
         return all(_body_leaves(body, targets) for body in (statement.then, statement.otherwise))
-    return isinstance(statement, (Goto, Stop, Return, End))
+    return isinstance(statement, (tree.Goto, tree.Stop, tree.Return, tree.End))
 
 
-def _body_leaves(body: tuple[Statement, ...], targets: frozenset[int]) -> bool:
+def _body_leaves(body: tuple[tree.Statement, ...], targets: frozenset[int]) -> bool:
     """Return whether the end of an IF's branch is never reached."""
     for statement in reversed(body):
         if _leaves(statement, targets):

@@ -10,54 +10,41 @@ from automax_ros.core.values import range_text
 from automax_ros.language.checks.rules.constant_values import constant_value, fits, hex_hint, literal_of
 from automax_ros.language.checks.rules.context import Context
 from automax_ros.language.checks.rules.expressions import check_boolean, check_expression, check_integer, check_variable
-from automax_ros.language.tree.tree import (
-    Assignment,
-    Data,
-    Element,
-    Expression,
-    For,
-    If,
-    IoWrite,
-    OnJump,
-    Print,
-    Read,
-    Reference,
-    Scope,
-    Statement,
-)
+from automax_ros.language.tree import tree
 
 _KINDS = {DataType.STRING: "string", DataType.BOOLEAN: "boolean"}
 
 
-def check_statement(context: Context, statement: Statement) -> None:
+def check_statement(context: Context, statement: tree.Statement) -> None:
     """Report the faults of one BASIC statement itself, not of those inside it."""
-    if isinstance(statement, Assignment):
+    if isinstance(statement, tree.Assignment):
         _check_assignment(context, statement)
-    elif isinstance(statement, If):
+    elif isinstance(statement, tree.If):
         check_boolean(context, statement.condition)
-    elif isinstance(statement, For):
+    elif isinstance(statement, tree.For):
         _check_for(context, statement)
-    elif isinstance(statement, OnJump):
+    elif isinstance(statement, tree.OnJump):
         check_integer(context, statement.selector, "AMX2009", "the selector of ON")
-    elif isinstance(statement, Read):
-        _check_read(context, statement)
-    elif isinstance(statement, Data):
-        _check_data(context, statement)
-    elif isinstance(statement, Print):
-        for item in statement.items:
+    elif isinstance(statement, tree.Read):
+        for target in statement.targets:
+            check_written(context, target)
+    elif isinstance(statement, (tree.Data, tree.Print)):
+        if isinstance(statement, tree.Data):
+            context.data.append((context.line or 0, statement))
+        for item in statement.values if isinstance(statement, tree.Data) else statement.items:
             check_expression(context, item)
-    elif isinstance(statement, IoWrite):
+    elif isinstance(statement, tree.IoWrite):
         _check_io_write(context, statement)
 
 
-def check_written(context: Context, target: Reference | Element) -> DataType | None:
+def check_written(context: Context, target: tree.Reference | tree.Element) -> DataType | None:
     """Report a target that no task can write: tunable, input point, pre-defined variable; return its type."""
     kind = check_variable(context, target)
     symbol = context.symbols.get(target.name)
     if symbol is not None and symbol.tuning is not None:
         hint = "only the operator changes a tunable (2.4.5)"
         context.report("AMX4016", f"{target.name} is tunable: the task cannot write it", target.span, hint)
-    if symbol is not None and symbol.scope is Scope.COMMON and target.name in PREDEFINED:
+    if symbol is not None and symbol.scope is tree.Scope.COMMON and target.name in PREDEFINED:
         hint = "the rack keeps it true to what it shows (2.4.6): write a variable of another name"
         context.report("AMX4122", f"{target.name} is pre-defined: the task cannot write it", target.span, hint)
     if context.is_input_point(target.name) and context.commons is not None:
@@ -80,7 +67,7 @@ def data_pool(context: Context) -> tuple[tuple[Value, ...], tuple[tuple[int, int
     return tuple(values), tuple(lines)
 
 
-def check_reads(context: Context, reads: list[tuple[Read, int | None]]) -> None:
+def check_reads(context: Context, reads: list[tuple[tree.Read, int | None]]) -> None:
     """Report READs for which the task's DATA have no value of the right kind."""
     values, _ = data_pool(context)
     if "DATA" in context.broken.words:
@@ -105,7 +92,7 @@ def assignable(target: DataType, value: DataType) -> bool:
     return target is value or (target.is_numeric and value.is_numeric)
 
 
-def check_constant_fits(context: Context, expression: Expression, kind: DataType, what: str) -> None:
+def check_constant_fits(context: Context, expression: tree.Expression, kind: DataType, what: str) -> None:
     """Report a constant that a variable of a numeric type cannot hold; the parser reports those beyond every REAL."""
     value = constant_value(expression)
     if isinstance(value, float) and not fits(value, DataType.REAL):
@@ -117,7 +104,7 @@ def check_constant_fits(context: Context, expression: Expression, kind: DataType
         context.report("AMX2007", message, expression.span, hex_hint(expression, kind) or hint)
 
 
-def _check_assignment(context: Context, statement: Assignment) -> None:
+def _check_assignment(context: Context, statement: tree.Assignment) -> None:
     target = check_written(context, statement.target)
     value = check_expression(context, statement.value)
     if target is None or value is None:
@@ -137,7 +124,7 @@ def _check_assignment(context: Context, statement: Assignment) -> None:
         check_constant_fits(context, statement.value, target, name)
 
 
-def _check_for(context: Context, statement: For) -> None:
+def _check_for(context: Context, statement: tree.For) -> None:
     variable = statement.variable
     kind = check_written(context, variable)
     if kind is not None and not kind.is_numeric:
@@ -155,7 +142,7 @@ def _check_for(context: Context, statement: For) -> None:
         _check_step(context, statement.step, kind)
 
 
-def _check_step(context: Context, step: Expression, kind: DataType) -> None:
+def _check_step(context: Context, step: tree.Expression, kind: DataType) -> None:
     value = constant_value(step)
     if isinstance(value, (bool, str)) or value is None or not fits(value, kind):
         return
@@ -164,18 +151,7 @@ def _check_step(context: Context, step: Expression, kind: DataType) -> None:
         context.report("AMX4056", "the STEP of a FOR loop is 0", step.span, hint)
 
 
-def _check_read(context: Context, statement: Read) -> None:
-    for target in statement.targets:
-        check_written(context, target)
-
-
-def _check_data(context: Context, statement: Data) -> None:
-    context.data.append((context.line or 0, statement))
-    for expression in statement.values:
-        check_expression(context, expression)
-
-
-def _check_io_write(context: Context, statement: IoWrite) -> None:
+def _check_io_write(context: Context, statement: tree.IoWrite) -> None:
     if context.target is Platform.UDC:
         context.report("AMX4027", "IOWRITE cannot be used in a UDC task", statement.span)
     for what, operand in (("slot", statement.slot), ("register", statement.register), ("value", statement.value)):

@@ -116,10 +116,7 @@ def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:
         if "END" not in context.broken.words and not any(isinstance(item, End) for item in layout.startup):
             context.line = None
             context.report(
-                "AMX4044",
-                "the task has no END",
-                _end_of_text(module),
-                "the last statement of a task is END",
+                "AMX4044", "the task has no END", _end_of_text(module), "the last statement of a task is END"
             )
         return
     following = [item for item in layout.scan[at + 1 :] if not isinstance(item, (Remark, Label))]
@@ -136,7 +133,6 @@ def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:
 
 
 def _end_of_text(module: Module) -> Span:
-    """Return the place of the last statement, the first line of an empty text."""
     last = _last(module)
     return Span(1, 1, 2) if last is None else last.span
 

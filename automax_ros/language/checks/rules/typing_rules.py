@@ -9,24 +9,14 @@ from __future__ import annotations
 
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.types import DataType
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.functions import FUNCTIONS
-from automax_ros.language.tree.tree import (
-    Binary,
-    BooleanLiteral,
-    Element,
-    Expression,
-    FunctionCall,
-    IntegerLiteral,
-    RealLiteral,
-    Reference,
-    StringLiteral,
-)
 
 RELATIONAL = frozenset({"=", "<>", "<", ">", "<=", ">="})
 LOGICAL = frozenset({"AND", "OR", "XOR"})
 
 
-def type_of(expression: Expression) -> DataType:
+def type_of(expression: tree.Expression) -> DataType:
     """Return the type of a checked expression.
 
     A decimal or hex constant is INTEGER up to 32767, above that DOUBLE; a variable or element has the type of its name.
@@ -35,24 +25,24 @@ def type_of(expression: Expression) -> DataType:
         ValueError: an operator has operands that it does not accept, which the checker refuses.
         KeyError: a function is not in the table, which the checker refuses too.
     """
-    if isinstance(expression, Binary):
+    if isinstance(expression, tree.Binary):
         return _type_of_chain(expression)
-    if isinstance(expression, (Reference, Element)):
+    if isinstance(expression, (tree.Reference, tree.Element)):
         return expression.type
-    if isinstance(expression, IntegerLiteral):
+    if isinstance(expression, tree.IntegerLiteral):
         return literal_integer_type(expression)
-    if isinstance(expression, RealLiteral):
+    if isinstance(expression, tree.RealLiteral):
         return DataType.REAL
-    if isinstance(expression, BooleanLiteral):
+    if isinstance(expression, tree.BooleanLiteral):
         return DataType.BOOLEAN
-    if isinstance(expression, StringLiteral):
+    if isinstance(expression, tree.StringLiteral):
         return DataType.STRING
-    if isinstance(expression, FunctionCall):
+    if isinstance(expression, tree.FunctionCall):
         return FUNCTIONS[expression.name].result.of(tuple(type_of(argument) for argument in expression.arguments))
     return _known(unary_type(expression.operator, type_of(expression.operand)), expression.operator)
 
 
-def literal_integer_type(literal: IntegerLiteral) -> DataType:
+def literal_integer_type(literal: tree.IntegerLiteral) -> DataType:
     """Return INTEGER for a constant of 0 to 32767, DOUBLE for a larger one."""
     return DataType.INTEGER if 0 <= literal.value <= INT16_MAX else DataType.DOUBLE
 
@@ -89,20 +79,20 @@ def binary_type(operator: str, left: DataType, right: DataType) -> DataType | No
     return DataType.REAL if DataType.REAL in types else DataType.DOUBLE
 
 
-def spine(expression: Binary) -> tuple[Expression, list[Binary]]:
+def spine(expression: tree.Binary) -> tuple[tree.Expression, list[tree.Binary]]:
     """Return the leftmost operand of a chain ``a + b + c ...`` and its operations from left to right.
 
     The tree of a chain is as deep to the left as the chain is long; walking it in this way avoids deep recursion.
     """
     operations = []
-    first: Expression = expression
-    while isinstance(first, Binary):
+    first: tree.Expression = expression
+    while isinstance(first, tree.Binary):
         operations.append(first)
         first = first.left
     return first, operations[::-1]
 
 
-def _type_of_chain(expression: Binary) -> DataType:
+def _type_of_chain(expression: tree.Binary) -> DataType:
     first, operations = spine(expression)
     result = type_of(first)
     for operation in operations:

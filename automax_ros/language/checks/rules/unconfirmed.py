@@ -6,19 +6,9 @@
 from __future__ import annotations
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.language.tree.basic_tree import Get, InputFile, PrintFile, Put
+from automax_ros.language.tree import tree
 from automax_ros.language.tree.functions import FUNCTIONS
 from automax_ros.language.tree.task_kind import TaskKind
-from automax_ros.language.tree.tree import (
-    Call,
-    Declaration,
-    Expression,
-    FunctionCall,
-    IoWrite,
-    Module,
-    SetEvent,
-    Statement,
-)
 from automax_ros.language.tree.walk import arguments_of, expressions_of, jumps_of, parts, statements_in_order
 
 UNCONFIRMED_STATEMENTS: dict[str, str] = {
@@ -37,7 +27,7 @@ UNCONFIRMED_FUNCTIONS: dict[str, str] = {
 """Functions, with the parts of them that are not confirmed."""
 
 
-def find_unconfirmed(module: Module, kind: TaskKind) -> list[tuple[Span, str]]:
+def find_unconfirmed(module: tree.Module, kind: TaskKind) -> list[tuple[Span, str]]:
     """Return the places of unconfirmed forms in the order of the text, each with its unconfirmed part."""
     found: list[tuple[Span, str]] = []
     for statement, _ in statements_in_order(module.statements):
@@ -48,23 +38,23 @@ def find_unconfirmed(module: Module, kind: TaskKind) -> list[tuple[Span, str]]:
     return found
 
 
-def _of_statement(statement: Statement, kind: TaskKind) -> list[tuple[Span, str]]:
-    if isinstance(statement, Call) and statement.number is None:
+def _of_statement(statement: tree.Statement, kind: TaskKind) -> list[tuple[Span, str]]:
+    if isinstance(statement, tree.Call) and statement.number is None:
         return [(statement.span, UNCONFIRMED_STATEMENTS["CALL"])]
-    if isinstance(statement, IoWrite):
+    if isinstance(statement, tree.IoWrite):
         return [(statement.span, UNCONFIRMED_STATEMENTS["IOWRITE"])]
-    if isinstance(statement, (InputFile, Get, PrintFile)) and jumps_of(statement):
+    if isinstance(statement, (tree.InputFile, tree.Get, tree.PrintFile)) and jumps_of(statement):
         return [(statement.span, UNCONFIRMED_STATEMENTS["EMPTY"])]
-    if isinstance(statement, (Get, Put)):
+    if isinstance(statement, (tree.Get, tree.Put)):
         return [(statement.span, UNCONFIRMED_STATEMENTS["GET"])]
-    if isinstance(statement, SetEvent) and kind is not TaskKind.BASIC:
+    if isinstance(statement, tree.SetEvent) and kind is not TaskKind.BASIC:
         return [(statement.span, UNCONFIRMED_STATEMENTS["SET"])]
-    if isinstance(statement, Declaration):
+    if isinstance(statement, tree.Declaration):
         tunings = [item.tuning for item in statement.variables if item.tuning is not None]
         return [(tuning.span, UNCONFIRMED_STATEMENTS["TUNABLE"]) for tuning in tunings]
     return []
 
 
-def _of_expression(expression: Expression) -> list[tuple[Span, str]]:
-    calls = [part for part in parts(expression) if isinstance(part, FunctionCall)]
+def _of_expression(expression: tree.Expression) -> list[tuple[Span, str]]:
+    calls = [part for part in parts(expression) if isinstance(part, tree.FunctionCall)]
     return [(call.span, UNCONFIRMED_FUNCTIONS[call.name]) for call in calls if call.name in UNCONFIRMED_FUNCTIONS]
