@@ -112,12 +112,8 @@ class Refusal:
     deaths: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Answer:
-    """The outcome of a piece."""
-
-    result: Any | None
-    fault: PieceFault | None
+Answer = tuple[Any, PieceFault | None]
+"""The result of a piece, or its fault."""
 
 
 def attempt(pickled: bytes, topic: str, wanted: Installation) -> Answer | Refusal:
@@ -149,8 +145,8 @@ def _answer(piece: Job, worker: str) -> Answer:
     try:
         pickle.dumps(done.result)
     except Exception as error:
-        return Answer(None, fault_of(piece.name, error, worker))
-    return Answer(done.result, done.fault)
+        return None, fault_of(piece.name, error, worker)
+    return done.result, done.fault
 
 
 def on_cluster(
@@ -184,9 +180,9 @@ def on_cluster(
 @contextmanager
 def _connected(scheduler: str) -> Iterator[_Cluster]:
     """Connect to a scheduler while the block lasts; Dask's log messages are suppressed, our errors replace them."""
-    loggers = {name: logging.getLogger(name) for name in _LOGGERS}
-    levels = {name: logger.level for name, logger in loggers.items()}
-    for logger in loggers.values():
+    loggers = [logging.getLogger(name) for name in _LOGGERS]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)
     try:
         client = client_of(scheduler)
@@ -196,8 +192,8 @@ def _connected(scheduler: str) -> Iterator[_Cluster]:
             with suppress(Exception):
                 client.close(timeout=2)
     finally:
-        for name, logger in loggers.items():
-            logger.setLevel(levels[name])
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 class _Cluster:
@@ -211,11 +207,7 @@ class _Cluster:
         self._without_workers_s = 0.0
 
     def require_same(self) -> None:
-        """Check that each present worker has the same installation as this machine.
-
-        Raises:
-            ClusterFault: one has another, or none, or does not respond.
-        """
+        """Raise ClusterFault if a present worker has another installation than this machine, or does not respond."""
         try:
             answers = within(SAME_S, lambda: self._client.run(installation, on_error="return"))
         except TimeoutError:
@@ -233,8 +225,8 @@ class _Cluster:
         future.add_done_callback(lambda _: over(number))
         return future
 
-    def outcome(self, piece: Job, future: Any) -> tuple[object, PieceFault | None]:
-        """Return the outcome of a piece that has ended: its result, or its fault.
+    def outcome(self, piece: Job, future: Any) -> Answer:
+        """Return the outcome of a piece that has ended.
 
         Raises:
             ClusterFault: the cluster is lost, or the worker has another installation.
@@ -244,19 +236,15 @@ class _Cluster:
         except Exception as error:
             self.require_alive(_LOOK_S)
             return None, _fault(piece, error)
-        if isinstance(found, Answer):
-            return found.result, found.fault
-        assert isinstance(found, Refusal)
+        if not isinstance(found, Refusal):
+            outcome: Answer = found
+            return outcome
         if found.installed != self._own:
             raise self._unlike(found.worker, found.installed)
         return None, death_of(piece.name, f"its workers have died ({', '.join(found.deaths)})")
 
     def require_alive(self, waited_s: float = 0.0) -> None:
-        """Check that there is a scheduler, and before long a worker; ``waited_s`` (s) have passed without a result.
-
-        Raises:
-            ClusterFault: there is none.
-        """
+        """Raise ClusterFault if there is no scheduler, or for long no worker; no result came for ``waited_s`` (s)."""
         self._unlooked_s += waited_s
         if self._unlooked_s < _LOOK_S and self._client.status == "running":
             return
@@ -274,7 +262,6 @@ class _Cluster:
             raise ClusterFault("AMX6853", self._scheduler, what, f"start some: `dask worker {self._scheduler}`")
 
     def give_up(self, futures: list[Any]) -> None:
-        """Cancel pieces that are not done."""
         if futures and self._client.status == "running":
             with suppress(Exception):
                 self._client.cancel(futures, force=True)
@@ -290,7 +277,6 @@ class _Cluster:
 
 
 def _other_machine(worker: str, found: Installation, own: Installation) -> str:
-    """Return a message about how a worker with the same sources differs."""
     if found.python != own.python:
         return f"worker {worker} has {found.python}, here is {own.python}"
     if found.numpy != own.numpy:

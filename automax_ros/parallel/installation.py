@@ -69,7 +69,6 @@ def results_digest() -> str:
 
 
 def _results() -> Iterator[float]:
-    """Yield the values of the C library's functions, 0 where they have none."""
     for argument in _ARGUMENTS:
         for function in _MATH:
             yield _value(partial(function, argument))

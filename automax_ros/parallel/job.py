@@ -66,11 +66,6 @@ class Workers:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse less than one job.
-
-        Raises:
-            ValueError: ``jobs`` is less than 1.
-        """
         if self.jobs is not None and self.jobs < 1:
             raise ValueError(f"{self.jobs} jobs: at least 1")
 

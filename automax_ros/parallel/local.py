@@ -10,11 +10,13 @@ and none of a library (decision). Threads of numerical libraries that end before
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import multiprocessing
 import multiprocessing.connection
 import os
 import pickle
+import select
 import signal
 import subprocess
 import sys
@@ -23,17 +25,16 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import NoReturn, Protocol
+from typing import NoReturn
 
-from automax_ros.parallel.job import MOST_TRIES, Job, JobResult, PieceFault, death_of
-from automax_ros.parallel.worker import work
+from automax_ros.parallel.job import MOST_TRIES, Job, JobResult, PieceFault, death_of, fault_of, result_of
 
 _THREADS = Path("/proc/self/task")
 """A folder with a name for each thread of this process; without it, processes are fresh interpreters."""
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _PROGRAM = (
     "import sys; sys.path[:] = sys.argv[2:]; from multiprocessing.connection import Connection; "
-    "from automax_ros.parallel.worker import work; work(Connection(int(sys.argv[1])))"
+    "from automax_ros.parallel.local import work; work(Connection(int(sys.argv[1])))"
 )
 """The program of a fresh interpreter: it imports only from our import path, not from its working folder."""
 
@@ -42,54 +43,32 @@ _POLL_S = 0.1
 """Seconds between two calls of ``should_stop``."""
 
 
-class Process(Protocol):
-    """A process that was started."""
-
-    def kill(self) -> int:
-        """End it at once; return its exit code, negative for a signal."""
-        ...
-
-
-def begin(end: Connection, ours: Iterable[Connection]) -> Process:
+def begin(end: Connection, ours: Iterable[Connection]) -> Callable[[], int]:
     """Start a process that does the pieces received from ``end``; ``ours`` are connections that it must close.
 
-    It has its own session: Ctrl-C at the terminal reaches only this process, which ends it.
+    It has its own session: Ctrl-C at the terminal reaches only this process, which ends it. Returns what ends it at
+    once, and gives its exit code, negative for a signal.
     """
-    return _copy(end, ours) or _Fresh(end)
+    return _copy(end, ours) or _fresh(end)
 
 
-class _Fresh:
-    """A fresh interpreter."""
+def _fresh(end: Connection) -> Callable[[], int]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", _PROGRAM, str(end.fileno()), *sys.path],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        pass_fds=(end.fileno(),),
+        start_new_session=True,
+    )
 
-    def __init__(self, end: Connection) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _PROGRAM, str(end.fileno()), *sys.path],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            pass_fds=(end.fileno(),),
-            start_new_session=True,
-        )
+    def kill() -> int:
+        process.kill()
+        return process.wait()
 
-    def kill(self) -> int:
-        self._process.kill()
-        return self._process.wait()
-
-
-class _Copy:
-    """A copy of this process."""
-
-    def __init__(self, pid: int) -> None:
-        self._pid = pid
-
-    def kill(self) -> int:
-        try:
-            os.kill(self._pid, signal.SIGKILL)
-            return os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
-        except (ProcessLookupError, ChildProcessError):
-            return 0  # the exit code is unknown if a program ignores SIGCHLD
+    return kill
 
 
-def _copy(end: Connection, ours: Iterable[Connection]) -> Process | None:
+def _copy(end: Connection, ours: Iterable[Connection]) -> Callable[[], int] | None:
     """Start a copy; return None if that would not be safe, or fails."""
     if threading.active_count() != 1 or not _THREADS.is_dir():
         return None
@@ -103,10 +82,17 @@ def _copy(end: Connection, ours: Iterable[Connection]) -> Process | None:
         return None
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, held)
-    copy = _Copy(pid)
+
+    def kill() -> int:
+        try:
+            os.kill(pid, signal.SIGKILL)
+            return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+        except (ProcessLookupError, ChildProcessError):
+            return 0  # the exit code is unknown if a program ignores SIGCHLD
+
     if len(list(_THREADS.iterdir())) == 1:
-        return copy
-    copy.kill()  # threads unknown to Python were running at the fork: the copy has done nothing yet
+        return kill
+    kill()  # threads unknown to Python were running at the fork: the copy has done nothing yet
     return None
 
 
@@ -137,7 +123,7 @@ def in_processes(
     workers: dict[Connection, _Worker] = {}
     try:
         for _ in range(count):
-            _begin(workers)
+            _Worker(workers)
         while True:
             for worker in workers.values():
                 if todo and worker.task is None:
@@ -175,52 +161,69 @@ def _take_from(
             piece = pieces[number]
             take(number, JobResult(piece, fault=death_of(piece.name, f"its process has died ({_ending(code)})")))
         if todo:
-            _begin(workers)
+            _Worker(workers)
         return
     worker.task = None
     take(number, JobResult(pieces[number], result, fault))
 
 
-def _begin(workers: dict[Connection, _Worker]) -> None:
-    worker = _Worker(list(workers))
-    workers[worker.end] = worker
-
-
 class _Worker:
     """A process that does one piece after the other; ``task`` is its present piece and the number of the try."""
 
-    def __init__(self, ends: list[Connection]) -> None:
-        """Start it; ``ends`` are those of the connections to others."""
+    def __init__(self, workers: dict[Connection, _Worker]) -> None:
+        """Start it and add it to the workers."""
         self.end, other = multiprocessing.Pipe()
         self.task: tuple[int, int] | None = None
         with other:
-            self._process = begin(other, [self.end, *ends])
+            self._kill = begin(other, [self.end, *workers])
+        workers[self.end] = self
 
     def give(self, pieces: Sequence[Job], number: int, tries: int) -> None:
         """Send it a piece; if it has died by now, that is detected when its answer is read."""
         self.task = number, tries
         payload = pickle.dumps(pieces[number])
-        try:
+        with contextlib.suppress(OSError):
             self.end.send_bytes(payload)
-        except OSError:
-            return
 
     def answer(self) -> tuple[object, PieceFault | None]:
-        """Return the outcome of the piece: its result, or its fault.
-
-        Raises:
-            EOFError: the process has died.
-            OSError: the process has died while it answered.
-        """
+        """Return the result and the fault of the piece; EOFError or OSError: the process has died."""
         answer: tuple[object, PieceFault | None] = pickle.loads(self.end.recv_bytes())
         return answer
 
     def kill(self) -> int:
-        """End it at once; return its exit code, negative for a signal."""
-        code = self._process.kill()
+        code = self._kill()
         self.end.close()
         return code
 
 
 def _ending(code: int) -> str:
     return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def work(end: Connection) -> None:
+    """Do the pieces received from a connection; return when its other end is closed."""
+    threading.Thread(target=_end_when_alone, args=(end.fileno(),), daemon=True).start()
+    with end:
+        while True:
+            try:
+                end.send_bytes(_answer(end.recv_bytes()))
+            except (EOFError, OSError):
+                return
+
+
+def _answer(payload: bytes) -> bytes:
+    """Do a pickled piece; return its result and its fault, pickled, or a fault if the result cannot be pickled."""
+    piece = pickle.loads(payload)
+    done = result_of(piece)
+    try:
+        return pickle.dumps((done.result, done.fault))
+    except Exception as error:
+        return pickle.dumps((None, fault_of(piece.name, error)))
+
+
+def _end_when_alone(number: int) -> None:
+    """End this process, whatever it is doing, when the process that sends pieces has ended, also by a signal."""
+    alone = select.poll()
+    alone.register(number, 0)  # nothing but the end of the other side
+    alone.poll()
+    os._exit(1)
