@@ -1,9 +1,10 @@
-"""DINT and REAL of the Logix controllers."""
+"""What the instructions of the Logix controllers share: DINT and REAL, and the enable members."""
 
 from __future__ import annotations
 
 import math
 import struct
+from dataclasses import dataclass, field
 
 from automax_ros.core.numbers import INT32_MAX, INT32_MIN
 
@@ -37,3 +38,26 @@ def single(value: float) -> float:
     except (OverflowError, struct.error):  # the latter for an int that is too large for any float
         return math.inf if value > 0 else -math.inf
     return held
+
+
+@dataclass
+class Instruction:
+    """The members of a tag that each instruction has. The first scan is that of a new tag or after a prescan."""
+
+    EnableIn: bool = True
+    EnableOut: bool = field(default=False, init=False)
+    _first_scan: bool = field(default=True, init=False, repr=False)
+
+    def prescan(self) -> None:
+        """Do what the controller does before its first scan in Run: EnableIn and EnableOut are cleared.
+
+        The next execution is a first scan. It needs EnableIn set again: by its wire in a function block diagram, by the
+        controller in structured text, by you here.
+        """
+        self.postscan()
+        self._first_scan = True
+
+    def postscan(self) -> None:
+        """Do what the controller does after a sequential function chart's last scan: clear EnableIn and EnableOut."""
+        self.EnableIn = False
+        self.EnableOut = False

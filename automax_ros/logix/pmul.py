@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 
 from automax_ros.core.numbers import INT32_MAX, INT32_MIN, sign_extended, truncated_quotient
-from automax_ros.logix.data_types import require_dint, single
+from automax_ros.logix.data_types import Instruction, require_dint, single
 
 GAIN_ONE = 100_000
 """The Multiplier whose ratio of In to Out is 1."""
@@ -23,8 +23,12 @@ EXACT_LIMIT = 2**24
 _INSTRUCT_FAULT, _WORD_SIZE_INV, _OUT_OVERFLOW, _LOST_PRECISION, _MULTIPLIER_INV = (1 << bit for bit in range(5))
 
 
+def _status_bit(bit: int, meaning: str) -> property:
+    return property(lambda tag: bool(tag.Status & bit), doc=meaning)
+
+
 @dataclass
-class PulseMultiplier:
+class PulseMultiplier(Instruction):
     """A tag of type PULSE_MULTIPLIER, with the instruction's internal registers.
 
     Set the input members, call ``scan``, read the output members. ``scan`` refuses values that the members' types
@@ -56,61 +60,28 @@ class PulseMultiplier:
     - Absolute mode keeps In(n-1) up to date, so that a change of Mode starts from the last In.
     """
 
-    EnableIn: bool = True
     In: int = 0
     Initialize: bool = False
     InitialValue: int = 0
     Mode: bool = True
     WordSize: int = 14
     Multiplier: int = GAIN_ONE
-    EnableOut: bool = field(default=False, init=False)
     Out: float = field(default=0.0, init=False)
     Status: int = field(default=0, init=False)
     previous_in: int = field(default=0, init=False)
     remainder: int = field(default=0, init=False)
-    _first_scan: bool = field(default=True, init=False, repr=False)
     _was_initialize: bool = field(default=False, init=False, repr=False)
 
-    @property
-    def InstructFault(self) -> bool:
-        """Status.0: one of the errors below was found."""
-        return bool(self.Status & _INSTRUCT_FAULT)
-
-    @property
-    def WordSizeInv(self) -> bool:
-        """Status.1: WordSize is not 2 to 32."""
-        return bool(self.Status & _WORD_SIZE_INV)
-
-    @property
-    def OutOverflow(self) -> bool:
-        """Status.2: the internal output left 32 bits, Out is infinite."""
-        return bool(self.Status & _OUT_OVERFLOW)
-
-    @property
-    def LostPrecision(self) -> bool:
-        """Status.3: Out is beyond +-2**24, where a REAL does not hold every whole number."""
-        return bool(self.Status & _LOST_PRECISION)
-
-    @property
-    def MultiplierInv(self) -> bool:
-        """Status.4: Multiplier is beyond +-1,000,000 and was limited."""
-        return bool(self.Status & _MULTIPLIER_INV)
+    InstructFault = _status_bit(_INSTRUCT_FAULT, "Status.0: one of the errors below was found.")
+    WordSizeInv = _status_bit(_WORD_SIZE_INV, "Status.1: WordSize is not 2 to 32.")
+    OutOverflow = _status_bit(_OUT_OVERFLOW, "Status.2: the internal output left 32 bits, Out is infinite.")
+    LostPrecision = _status_bit(_LOST_PRECISION, "Status.3: Out is beyond +-2**24, where a REAL has not every number.")
+    MultiplierInv = _status_bit(_MULTIPLIER_INV, "Status.4: Multiplier is beyond +-1,000,000 and was limited.")
 
     def prescan(self) -> None:
-        """Do what the controller does before its first scan in Run: EnableIn and EnableOut are cleared.
-
-        The next execution is a first scan. It needs EnableIn set again: by its wire in a function block diagram, by the
-        controller in structured text, by you here.
-        """
-        self.EnableIn = False
-        self.EnableOut = False
-        self._first_scan = True
+        """Do the prescan; the next execution is not that after Initialize."""
+        super().prescan()
         self._was_initialize = False
-
-    def postscan(self) -> None:
-        """Do what the controller does after a sequential function chart's last scan: clear EnableIn and EnableOut."""
-        self.EnableIn = False
-        self.EnableOut = False
 
     def scan(self) -> None:
         """Execute the instruction once, if EnableIn is set.
@@ -118,7 +89,8 @@ class PulseMultiplier:
         Raises:
             ValueError: In, InitialValue, WordSize or Multiplier is not a DINT; nothing was executed.
         """
-        self._require_dints()
+        for member in ("In", "InitialValue", "WordSize", "Multiplier"):
+            require_dint(member, getattr(self, member))
         self.EnableOut = bool(self.EnableIn)
         if not self.EnableIn:
             return
@@ -132,12 +104,6 @@ class PulseMultiplier:
             self.Out, errors = _out_of(self._multiplied())
             found |= errors
         self.Status = found | _INSTRUCT_FAULT if found else 0
-
-    def _require_dints(self) -> None:
-        require_dint("In", self.In)
-        require_dint("InitialValue", self.InitialValue)
-        require_dint("WordSize", self.WordSize)
-        require_dint("Multiplier", self.Multiplier)
 
     def _set_registers(self) -> None:
         """Set the registers as Initialize, its end, or a first scan requires."""
@@ -174,7 +140,6 @@ class PulseMultiplier:
 
 
 def _out_of(quotient: int) -> tuple[float, int]:
-    """Return Out and the status bits about it."""
     if not INT32_MIN <= quotient <= INT32_MAX:
         return math.copysign(math.inf, quotient), _OUT_OVERFLOW | _LOST_PRECISION
     return single(quotient), 0 if -EXACT_LIMIT <= quotient <= EXACT_LIMIT else _LOST_PRECISION

@@ -34,7 +34,6 @@ class PulseParameters:
     initial_value: int = 0
 
     def __post_init__(self) -> None:
-        """Check the ranges."""
         if not 0 <= self.word_size <= MAX_WORD_SIZE:
             raise ConversionError(f"WORD_SIZE lies between 0 and {MAX_WORD_SIZE}, {self.word_size} does not")
         if 0 < self.word_size < MIN_WORD_SIZE:
@@ -104,13 +103,14 @@ class PulseComparison:
     """
 
     def __init__(self, parameters: PulseParameters) -> None:
-        """Create both, as before the first scan of a task."""
-        self._block = Instance(PULSE_MULT, DEFAULT_TICK_NS, **_literals(parameters))  # the period does not matter to it
+        literals: dict[str, Value] = {"word_size": parameters.word_size, "initial_value": parameters.initial_value}
+        if parameters.multiplier is not None:
+            literals["multiplier"] = parameters.multiplier
+        self._block = Instance(PULSE_MULT, DEFAULT_TICK_NS, **literals)  # the period does not matter to it
         self._tag = parameters.pmul()
         self.scans = 0
         self.differing = 0
-        self.output = Pair(0, 0, 0)
-        self.total = Pair(0, 0, 0)
+        self.output = self.total = Pair(0, 0, 0)
         self.first_output: Pair | None = None
         self.first_total: Pair | None = None
         self.greatest_output: Pair | None = None
@@ -133,13 +133,6 @@ class PulseComparison:
         if self.total.difference:
             self.first_total = self.first_total or self.total
             self.greatest_total = _greater(self.greatest_total, self.total)
-
-
-def _literals(parameters: PulseParameters) -> dict[str, Value]:
-    literals: dict[str, Value] = {"word_size": parameters.word_size, "initial_value": parameters.initial_value}
-    if parameters.multiplier is not None:
-        literals["multiplier"] = parameters.multiplier
-    return literals
 
 
 def _greater(held: Pair | None, new: Pair) -> Pair:

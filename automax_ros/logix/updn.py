@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from automax_ros.logix.data_types import require_real, single
+from automax_ros.logix.data_types import Instruction, require_real, single
 
 
 @dataclass
-class UpDownAccumulator:
+class UpDownAccumulator(Instruction):
     """A tag of type UP_DOWN_ACCUM, with the instruction's internal accumulator.
 
     Set the input members, call ``scan``, read ``Out``. Numbers are REAL: each sum is rounded to an IEEE single, so
@@ -23,27 +23,13 @@ class UpDownAccumulator:
     a prescan (decision).
     """
 
-    EnableIn: bool = True
     Initialize: bool = False
     InitialValue: float = 0.0
     InPlus: float = 0.0
     InMinus: float = 0.0
     Hold: bool = False
-    EnableOut: bool = field(default=False, init=False)
     Out: float = field(default=0.0, init=False)
     accumulator: float = field(default=0.0, init=False)
-    _first_scan: bool = field(default=True, init=False, repr=False)
-
-    def prescan(self) -> None:
-        """Do what the controller does before its first scan in Run: clear EnableIn and EnableOut (see PMUL)."""
-        self.EnableIn = False
-        self.EnableOut = False
-        self._first_scan = True
-
-    def postscan(self) -> None:
-        """Clear EnableIn and EnableOut."""
-        self.EnableIn = False
-        self.EnableOut = False
 
     def scan(self) -> None:
         """Execute the instruction once, if EnableIn is set; without it Out and the accumulator do not change.
@@ -51,9 +37,8 @@ class UpDownAccumulator:
         Raises:
             ValueError: InitialValue, InPlus or InMinus is not a number; nothing was executed.
         """
-        require_real("InitialValue", self.InitialValue)
-        require_real("InPlus", self.InPlus)
-        require_real("InMinus", self.InMinus)
+        for member in ("InitialValue", "InPlus", "InMinus"):
+            require_real(member, getattr(self, member))
         if not self.EnableIn:
             self.EnableOut = False
             return
