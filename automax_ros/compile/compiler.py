@@ -1,6 +1,6 @@
-"""The compiler from a checked program to Python functions; for BASIC tasks see ``basic_compiler``.
+"""The compiler from a checked program to Python functions.
 
-Three functions come from one lowering of the same tree:
+For a control-block task three functions come from one lowering of the same tree:
 
 - ``startup(state, io)``: the statements before SCAN_LOOP;
 - ``scans(state, io)``: a generator; each ``next`` is one scan from SCAN_LOOP to END, at one instant;
@@ -19,57 +19,55 @@ the layout's fields: loaded into locals at the start, stored back at the end, al
 ends when it is closed: between scans its locals hold the state, so that a scan neither loads nor stores it. ``io`` has
 all other accesses of a scan: see ``ScanIo``.
 
-``scan_steps`` and the printed source are made on first use: most runs need neither.
+A BASIC task has two functions that execute a burst, the statements from one suspension to the next:
+``burst(state, io)`` at one instant, and the generator ``burst_steps(state, io)``, which yields the modeled time before
+each access to shared data, and before the burst ends. Both begin at the ``PC`` of the state and return a ``Suspension``
+with its number, for which the task then waits. All values that must outlast a suspension are in the state: the PC,
+GOSUB's stack, limits and steps of FOR, and which files are open. So a waiting task can be saved, loaded and executed
+again.
+
+Functions other than ``startup``, ``scans`` and the printed source are made on first use: most runs need none.
 """
 
 from __future__ import annotations
 
 import ast
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Protocol, cast
+from typing import Any, ClassVar, cast
 
 from automax_ros.compile.base import build
 from automax_ros.compile.base.assembly import Form, called, local_field, made, stores
 from automax_ros.compile.base.cost import CostModel
 from automax_ros.compile.base.emitter import Emitter
-from automax_ros.compile.base.layout import Layout, StateField
+from automax_ros.compile.base.layout import Layout, Role, StateField
 from automax_ros.compile.base.pynames import block_prefix, forced_name, latched_name, variable_name
-from automax_ros.compile.base.scan_io import BackgroundIo, LineForm, ScanIo, ScanLines, ScanTooLong, StateValues, Wish
-from automax_ros.compile.basic_compiler import BackgroundCompilation
+from automax_ros.compile.base.scan_io import (
+    BackgroundIo,
+    LineForm,
+    ScanIo,
+    ScanLines,
+    ScanTooLong,
+    StateValues,
+    Suspension,
+    Wish,
+)
+from automax_ros.compile.lowering.basic_statements import EVERY, GOSUB, WaitingLowering
 from automax_ros.compile.lowering.calls import BlockInstance, instance_of, lower_minor_loop
+from automax_ros.compile.lowering.flow import PC
 from automax_ros.compile.lowering.statements import STOPPED, StatementLowering
+from automax_ros.core.types import DataType
 from automax_ros.language.program import Program
-from automax_ros.language.tree.tree import Call, For, If, Reference, Scope, Statement
+from automax_ros.language.tree.tree import Call, Reference, Scope
+from automax_ros.language.tree.walk import statements_in_order
 
 Startup = Callable[[StateValues, ScanIo], bool]
 Scans = Callable[[StateValues, ScanIo], Generator[bool, None, None]]
 Burst = Callable[[StateValues, BackgroundIo], Wish]
 BurstSteps = Callable[[StateValues, BackgroundIo], Generator[int, None, Wish]]
 ScanSteps = Callable[[StateValues, ScanIo], Generator[int, None, bool]]
-
-
-class Compilation(Protocol):
-    """Makes the functions of one task on demand; ``names`` are those of its printed source."""
-
-    names: tuple[str, ...]
-
-    def functions(self, *names: str) -> dict[str, object]:
-        """Compile some of the functions."""
-        ...
-
-    def definitions(self, *names: str) -> list[ast.FunctionDef]:
-        """Return some of the functions as trees."""
-        ...
-
-    def form(self, name: str) -> Form:
-        """Return one of the functions for translation into another language."""
-        ...
-
-    def line_form(self) -> LineForm:
-        """Compile the form that yields before each BASIC line."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ class CompiledTask:
     written: tuple[str, ...]
     startup: Startup
     scans: Scans
-    _compilation: Compilation = field(repr=False, compare=False)
+    _compilation: _Compilation = field(repr=False, compare=False)
     _again: Callable[[frozenset[str]], CompiledTask] = field(repr=False, compare=False)
     held: frozenset[str] = frozenset()
     latched_views: tuple[int, ...] = ()
@@ -156,10 +154,8 @@ def compile_program(program: Program, views: Mapping[str, int], cost_model: Cost
 
 def _compiled(program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> CompiledTask:
     again = partial(_compiled, program, views, cost_model)
-    if not program.is_basic:
-        return _Compilation(program, views, cost_model, held).result(again)
-    compilation = BackgroundCompilation(program, views, cost_model, held)
-    return CompiledTask(program, compilation.layout, (), (), _no_startup, _no_scans, compilation, again, held)
+    kind = _BasicCompilation if program.is_basic else _ScanCompilation
+    return kind(program, views, cost_model, held).result(again)
 
 
 def _no_startup(_: StateValues, __: ScanIo) -> bool:
@@ -170,81 +166,147 @@ def _no_scans(_: StateValues, __: ScanIo) -> Generator[bool, None, None]:
     yield from ()
 
 
-class _Compilation:
-    names: tuple[str, ...] = ("startup", "scans", "scan_steps")
+_Part = tuple[str, Emitter, StatementLowering]
+"""A function that is lowered, before its state is known: its name, its body, and what the body needs."""
+
+
+class _Compilation(ABC):
+    """Makes the functions of one task on demand; ``names`` are those of its printed source."""
+
+    names: ClassVar[tuple[str, ...]]
+    line_name: ClassVar[str]
 
     def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> None:
-        self._program, self._held = program, held
+        self._program, self._cost, self._held = program, cost_model, held
         self._views = {name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
-        self._cost = cost_model
-        self._instances = _instances(program)
-        self._latched = tuple(symbol.name for symbol in program.symbols.values() if symbol.latched)
         self._fields: dict[str, StateField] = {
             variable_name(symbol.name): local_field(symbol)
             for symbol in program.symbols.values()
             if symbol.scope is Scope.LOCAL
         }
-        for instance in self._instances.values():
-            self._fields.update(instance.fields)
         self._globals: dict[str, object] = {"ScanTooLong": ScanTooLong}
 
+    @abstractmethod
     def result(self, again: Callable[[frozenset[str]], CompiledTask]) -> CompiledTask:
         """Compile the task; ``again`` compiles it with other variables held."""
+
+    def functions(self, *names: str) -> dict[str, Any]:
+        return made(self.definitions(*names), self._program.name, self._globals)
+
+    def definitions(self, *names: str) -> list[ast.FunctionDef]:
+        """Return functions as trees; the state's fields are known once ``scans`` or ``burst`` is lowered."""
+        parts = [self._lowered(name) for name in names]
+        return [self._wrapped(*part) for part in parts]
+
+    def form(self, name: str) -> Form:
+        return Form(self.definitions(name)[0], dict(self._globals), self._views)
+
+    def line_form(self) -> LineForm:
+        """Compile the form that yields before each line; it applies forces."""
+        part = self._lowered(self.line_name)
+        functions = made([self._wrapped(*part)], self._program.name, self._globals)
+        return LineForm(cast(ScanLines, functions[self.line_name]), frozenset(part[1].lines))
+
+    @abstractmethod
+    def _lowered(self, name: str) -> _Part: ...
+
+    @abstractmethod
+    def _wrapped(self, name: str, emitter: Emitter, lowering: StatementLowering) -> ast.FunctionDef: ...
+
+    def _emitter(self, name: str) -> Emitter:
+        modeled, by_lines = "_steps" in name, "_lines" in name
+        return Emitter(self._program, self._views, modeled, self._cost, by_lines=by_lines, held=self._held)
+
+    def _bind(self, emitter: Emitter) -> None:
+        self._globals.update(called(emitter))
+        self._globals.update(emitter.extra_globals)
+
+
+class _BasicCompilation(_Compilation):
+    names = ("burst", "burst_steps")
+    line_name = "burst_lines"
+
+    def result(self, again: Callable[[frozenset[str]], CompiledTask]) -> CompiledTask:
+        self._fields[PC] = StateField("PC", DataType.DOUBLE, Role.STACK, 0)
+        self.definitions("burst")
+        layout = Layout(tuple(self._fields.values()))
+        return CompiledTask(self._program, layout, (), (), _no_startup, _no_scans, self, again, self._held)
+
+    def _lowered(self, name: str) -> _Part:
+        emitter = self._emitter(name)
+        lowering = WaitingLowering(emitter, {})
+        lowering.lower_all(self._program.scan)
+        self._fields.update(lowering.fields)
+        self._fields[PC] = replace(self._fields[PC], below=lowering.blocks + 1)
+        self._end(emitter)
+        return name, emitter, lowering
+
+    def _wrapped(self, name: str, emitter: Emitter, _: StatementLowering) -> ast.FunctionDef:
+        self._bind(emitter)
+        opening = [build.assign_all(list(self._fields), build.name("state")), build.assign("steps", build.constant(0))]
+        if emitter.modeled:
+            opening.append(build.assign("cost", build.constant(0)))
+        kept = stores(list(self._fields), emitter.body)
+        emitter.shown.elts += [build.name(known) for known in self._fields]
+        return build.function(name, ["state", "io"], [*opening, build.finally_do(emitter.body, kept)])
+
+    def _end(self, emitter: Emitter) -> None:
+        """Emit END, which also leaves a subroutine; the next run begins after the START EVERY, if there is one."""
+        emitter.checkpoint()
+        if GOSUB in self._fields:
+            emitter.emit(build.assign(GOSUB, build.constant(0)))
+        if EVERY in self._fields:
+            emitter.emit(build.when(build.name(EVERY), [build.assign(PC, build.name(EVERY))]))
+        again = build.name(EVERY) if EVERY in self._fields else build.constant(0)
+        emitter.emit(ast.Return(ast.Tuple([build.constant(int(Suspension.END)), again], build.LOAD)))
+
+
+class _ScanCompilation(_Compilation):
+    names = ("startup", "scans", "scan_steps")
+    line_name = "scan_lines_forced"
+
+    def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> None:
+        super().__init__(program, views, cost_model, held)
+        self._instances = _instances(program)
+        self._latched = tuple(symbol.name for symbol in program.symbols.values() if symbol.latched)
+        for instance in self._instances.values():
+            self._fields.update(instance.fields)
+
+    def result(self, again: Callable[[frozenset[str]], CompiledTask]) -> CompiledTask:
         functions = self.functions("startup", "scans")
         return CompiledTask(
             program=self._program,
             layout=Layout(tuple(self._fields.values())),
             latched=self._latched,
             written=self._written(),
-            startup=cast(Startup, functions["startup"]),
-            scans=cast(Scans, functions["scans"]),
+            startup=functions["startup"],
+            scans=functions["scans"],
             _compilation=self,
             _again=again,
             held=self._held,
             latched_views=tuple(self._views[name] for name in self._latched),
         )
 
-    def functions(self, *names: str) -> dict[str, object]:
-        """Compile some of the functions."""
-        return made(self.definitions(*names), self._program.name, self._globals)
-
-    def definitions(self, *names: str) -> list[ast.FunctionDef]:
-        """Lower some of the three functions; the state's fields are known once ``scans`` is among them."""
-        parts = [self._function(name) for name in names]
-        return [self._wrapped(*part) for part in parts]
-
-    def form(self, name: str) -> Form:
-        """Return one of the functions for translation into another language."""
-        function = self.definitions(name)[0]
-        return Form(function, dict(self._globals), self._views)
-
-    def line_form(self) -> LineForm:
-        """Compile the form that yields before each line; it applies forces."""
-        name = "scan_lines_forced"
-        part = self._function(name)
-        functions = made([self._wrapped(*part)], self._program.name, self._globals)
-        return LineForm(cast(ScanLines, functions[name]), frozenset(part[2].lines))
-
-    def _function(self, name: str) -> tuple[str, list[ast.stmt], Emitter, StatementLowering]:
-        scans = name != "startup"
-        statements = self._program.scan if scans else self._program.startup
-        emitter = Emitter(self._program, self._views, name.startswith("scan_steps"), self._cost, held=self._held)
+    def _lowered(self, name: str) -> _Part:
+        emitter = self._emitter(name)
         emitter.forces = frozenset(self._written()) if name.endswith("_forced") else frozenset()
-        emitter.by_lines = name.startswith("scan_lines")
         lowering = StatementLowering(emitter, dict(self._instances.items()))
-        if scans:
-            emitter.line = self._program.scan_loop_line
-            emitter.add_cost(self._cost.scan_loop_ns(self._program))
-            self._latch(emitter)
-            if self._program.cml is not None:
-                lower_minor_loop(emitter, self._program.cml)
-        lowering.lower_all(statements)
+        if name == "startup":
+            lowering.lower_all(self._program.startup)
+        else:
+            self._lower_scan(emitter, lowering)
         self._fields.update(lowering.fields)
-        body = emitter.body
-        if scans:
-            commit = self._commit(emitter)
-            body.extend([build.when(build.inverse(build.name(STOPPED)), commit)] if lowering.can_stop else commit)
-        return name, body, emitter, lowering
+        return name, emitter, lowering
+
+    def _lower_scan(self, emitter: Emitter, lowering: StatementLowering) -> None:
+        emitter.line = self._program.scan_loop_line
+        emitter.add_cost(self._cost.scan_loop_ns(self._program))
+        self._latch(emitter)
+        if self._program.cml is not None:
+            lower_minor_loop(emitter, self._program.cml)
+        lowering.lower_all(self._program.scan)
+        commit = self._commit(emitter)
+        emitter.body += [build.when(build.inverse(build.name(STOPPED)), commit)] if lowering.can_stop else commit
 
     def _latch(self, emitter: Emitter) -> None:
         """Emit the latch; a task without latched commons still takes the time of SCAN_LOOP."""
@@ -264,7 +326,6 @@ class _Compilation:
             emitter.emit(build.assign_all(flags, build.call(emitter.member("forces"))))
 
     def _written(self) -> tuple[str, ...]:
-        """Return the latched commons that a block may change, in the order of the latch."""
         bounds = [instance.bound for instance in self._instances.values()]
         if self._program.cml is not None:
             bounds.append(self._program.cml)
@@ -291,12 +352,10 @@ class _Compilation:
         body, emitter.body = emitter.body, outer
         return body
 
-    def _wrapped(
-        self, name: str, body: list[ast.stmt], emitter: Emitter, lowering: StatementLowering
-    ) -> ast.FunctionDef:
+    def _wrapped(self, name: str, emitter: Emitter, lowering: StatementLowering) -> ast.FunctionDef:
         """Return the whole function: load the state, bind the names in use, execute the body, store the state."""
-        self._globals.update(called(emitter))
-        self._globals.update(emitter.extra_globals)
+        self._bind(emitter)
+        body = emitter.body
         opening: list[ast.stmt] = []
         if self._fields:
             opening.append(build.assign_all(list(self._fields), build.name("state")))
@@ -331,21 +390,11 @@ class _Compilation:
 def _instances(program: Program) -> dict[object, BlockInstance]:
     instances: dict[object, BlockInstance] = {}
     occurrences: dict[int, int] = {}
-    for call in _calls(program.scan):
+    for call, _ in statements_in_order(program.scan):
+        if not isinstance(call, Call):
+            continue
         bound = program.calls[call.span]
         occurrence = occurrences.get(bound.line, 0)
         occurrences[bound.line] = occurrence + 1
         instances[call.span] = instance_of(bound, block_prefix(bound.line, occurrence), occurrence, program.period_ns)
     return instances
-
-
-def _calls(statements: tuple[Statement, ...]) -> list[Call]:
-    found: list[Call] = []
-    for statement in statements:
-        if isinstance(statement, Call):
-            found.append(statement)
-        elif isinstance(statement, If):
-            found += _calls(statement.then) + _calls(statement.otherwise)
-        elif isinstance(statement, For):
-            found += _calls(statement.body)
-    return found

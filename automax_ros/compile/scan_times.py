@@ -12,7 +12,8 @@ import enum
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from automax_ros.compile.base.cost import CostModel
+from automax_ros.compile.base.cost import CostModel, Model
+from automax_ros.compile.lowering.basic_statements import WaitingLowering
 from automax_ros.compile.lowering.loops import counts_alone
 from automax_ros.compile.lowering.statements import GOSUB_DEPTH
 from automax_ros.compile.paths import NOTHING, Span, longest_turn, ways_out
@@ -115,7 +116,8 @@ def _loop_ns(program: Program, model: CostModel) -> int:
 
 def is_estimated(statements: tuple[Statement, ...], model: CostModel) -> bool:
     """Return whether a BASIC statement among these, or inside them, has a time that is an estimate."""
-    return any(model.is_estimate(statement) for statement, _ in statements_in_order(statements))
+    kinds = {type(statement) for statement, _ in statements_in_order(statements)}
+    return model.model is not Model.NONE and not kinds.isdisjoint(WaitingLowering.estimates_us)
 
 
 def _either(ways: _Ways, *names: _Way) -> Span | None:
@@ -144,7 +146,6 @@ def _to_the_end(ways: _Ways) -> _Ways:
 
 
 def _called(statements: tuple[Statement, ...]) -> frozenset[int]:
-    """Return the lines of all subroutines."""
     return frozenset(line for item, _ in statements_in_order(statements) if _calls(item) for line in jumps_of(item))
 
 
@@ -162,7 +163,6 @@ class _Suite:
     inside: bool
 
     def ways(self, statements: tuple[Statement, ...], first: int = 0) -> _Ways:
-        """Return the exits of statements, from one of them on."""
         return ways_out(self.edges(statements), first)
 
     def edges(self, statements: tuple[Statement, ...]) -> list[_Ways]:
@@ -184,7 +184,7 @@ class _Suite:
         return [*edges, {_Way.NEXT: NOTHING}]
 
     def _statement(self, statement: Statement) -> _Ways:
-        own = self.model.statement_ns(statement)
+        own = WaitingLowering.statement_ns(self.model, statement)
         if isinstance(statement, Call):
             least, most = self.model.block_bounds_ns(self.program.calls[statement.span])
             return {_Way.NEXT: Span(least, most)}

@@ -6,8 +6,9 @@ from hypothesis import settings
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
-from automax_ros.compile.base.cost import CostModel
+from automax_ros.compile.base.cost import NEXT_US, CostModel
 from automax_ros.compile.compiler import CompiledTask, compile_program
+from automax_ros.compile.lowering.basic_statements import WaitingLowering
 from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.core.types import Value
 from automax_ros.language.checks.checker import check
@@ -19,6 +20,8 @@ from automax_ros.runtime.tasks.basic_task import BasicTask
 from automax_ros.runtime.tasks.task import ScanRecord, Task
 
 TICK = 5_500_000
+ESTIMATES_US = {"Next": NEXT_US, **{kind.__name__: us for kind, us in WaitingLowering.estimates_us.items()}}
+"""Estimated time of each BASIC statement on a 7010, microseconds."""
 WRITER, OTHER = 1, 9
 """Ids of the task under test and of another writer."""
 

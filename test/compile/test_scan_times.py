@@ -8,17 +8,17 @@ from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
-from automax_ros.compile.base.cost import STATEMENT_ESTIMATES_US, CostModel, Model
+from automax_ros.compile.base.cost import CostModel, Model
 from automax_ros.compile.scan_times import period_ns, scan_times
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
-from compile.support import TICK, lines, program_of, repeatable, scan_in_steps, task_of
+from compile.support import ESTIMATES_US, TICK, lines, program_of, repeatable, scan_in_steps, task_of
 
 SUMMER = "CALL SUMMER(INPUT1=A%, INPUT2=B%, OUTPUT=B%)"
 LAG = "CALL LAG(INPUT=A%, WLG=2.0, OUTPUT=C%)"
 SCAN_LOOP_7010, END_7010, SUMMER_7010, LAG_7010, REMARK_7010 = 80.00, 13.82, 11.28, 26.52, 9.88
 ASSIGN, IF, FOR, NEXT, GOTO, GOSUB, RETURN, ON = (
-    STATEMENT_ESTIMATES_US[name] for name in ("Assignment", "If", "For", "Next", "Goto", "Gosub", "Return", "OnJump")
+    ESTIMATES_US[name] for name in ("Assignment", "If", "For", "Next", "Goto", "Gosub", "Return", "OnJump")
 )
 
 
@@ -281,7 +281,7 @@ def basic(text: str):
 
 def test_a_basic_task_is_what_start_every_repeats():
     times = scan_times(basic(BASIC), CostModel(Model.MODEL_7010))
-    least = sum(STATEMENT_ESTIMATES_US[name] for name in ("Assignment", "InputFile", "Print"))
+    least = sum(ESTIMATES_US[name] for name in ("Assignment", "InputFile", "Print"))
     assert times.least_ns / 1000 == pytest.approx(least)
     assert times.most_ns / 1000 == pytest.approx(least + ASSIGN)
     assert times.estimated
@@ -294,13 +294,13 @@ def test_a_basic_task_that_never_ends_counts_one_turn():
     times = scan_times(
         basic("10 COMMON KA%\n20 KA% = 1\n30 DELAY 2 SECONDS\n40 GOTO 20\n50 END\n"), CostModel(Model.PC3000)
     )
-    assert (times.least_ns, times.most_ns) == (0, round(0.7 * (ASSIGN + STATEMENT_ESTIMATES_US["Delay"] + GOTO) * 1000))
+    assert (times.least_ns, times.most_ns) == (0, round(0.7 * (ASSIGN + ESTIMATES_US["Delay"] + GOTO) * 1000))
 
 
 def test_a_loop_whose_variable_a_message_sets_has_no_known_turns():
     text = "10 LOCAL I%\n20 OPEN CHANNEL FOR INPUT AS FILE #1, TYPE=(I), DEPTH=4\n30 FOR I% = 1 TO 3\n"
     text += "40 INPUT #1, I%\n50 NEXT I%\n60 END\n"
     times = scan_times(basic(text), CostModel(Model.MODEL_7010))
-    least = STATEMENT_ESTIMATES_US["OpenChannel"] + FOR
+    least = ESTIMATES_US["OpenChannel"] + FOR
     assert times.least_ns / 1000 == pytest.approx(least)
-    assert times.most_ns / 1000 == pytest.approx(least + STATEMENT_ESTIMATES_US["InputFile"] + NEXT)
+    assert times.most_ns / 1000 == pytest.approx(least + ESTIMATES_US["InputFile"] + NEXT)

@@ -1,7 +1,7 @@
 """Modeled execution times of a task on a Processor (section 53).
 
-Blocks, SCAN_LOOP, END and ``!`` remarks have the manual's times. It has none for BASIC statements: the table of
-estimates below is ours (decision: no source prints these times).
+Blocks, SCAN_LOOP, END and ``!`` remarks have the manual's times. It has none for BASIC statements: their estimates, in
+the tables of the lowering, are ours (decision: no source prints these times).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES, SCAN_LOOP
 from automax_ros.core.ticks import NS_PER_US, UDC_MAX_TICKS
 from automax_ros.core.types import DataType
 from automax_ros.language.program import BoundCall, Program, Symbol
-from automax_ros.language.tree.tree import Remark, Statement
+from automax_ros.language.tree.tree import Remark
 
 
 class Model(enum.Enum):
@@ -34,36 +34,9 @@ PLATFORMS = {Model.UDC: Platform.UDC, Model.PC3000: Platform.PC3000}
 MOST_SHARED_TICKS = {Model.UDC: UDC_MAX_TICKS}
 """Largest TICKS of modules whose tasks run one after the other in one scan (53.2)."""
 
-STATEMENT_ESTIMATES_US = {
-    "Assignment": 6.0,
-    "If": 4.0,
-    "For": 8.0,
-    "Next": 6.0,
-    "Goto": 2.0,
-    "Gosub": 4.0,
-    "Return": 3.0,
-    "OnJump": 5.0,
-    "Read": 6.0,
-    "Restore": 2.0,
-    "Print": 60.0,
-    "IoWrite": 10.0,
-    "ClearErrorLog": 4.0,
-    "SetEvent": 12.0,
-    "WaitOn": 20.0,
-    "Delay": 20.0,
-    "StartEvery": 20.0,
-    "OpenChannel": 60.0,
-    "OpenPort": 60.0,
-    "Close": 30.0,
-    "InputFile": 40.0,
-    "PrintFile": 60.0,
-    "Get": 30.0,
-    "Put": 40.0,
-    "MinorLoop": 250.0,
-}
-"""Estimated microseconds on a 7010 by kind of BASIC statement, Next for each turn; others take none (decision).
-
-MinorLoop is a scan of DC_DRIVE_CML without the latch of the commons: no manual prints its time.
+NEXT_US, MINOR_LOOP_US = 6.0, 250.0
+"""Estimated microseconds on a 7010 of each turn of a FOR, and of a scan of DC_DRIVE_CML without the latch of the
+commons: no manual prints its time (decision).
 """
 SLOWER_THAN_7010 = {Model.MODEL_6010: 4.0, Model.MODEL_6011: 4.0, Model.UDC: 0.8, Model.PC3000: 0.7}
 """Time of a BASIC statement on each module over the 7010's estimate (decision: the ratios of tables 4 to 6)."""
@@ -91,10 +64,6 @@ class CostModel:
         programmed, each = self.block_ns(bound), self.element_ns(bound)
         return programmed + each, programmed + each * max(1, bound.elements)
 
-    def is_estimate(self, statement: Statement) -> bool:
-        """Return whether a statement's time is one of the estimates, not the manual's."""
-        return self.model is not Model.NONE and type(statement).__name__ in STATEMENT_ESTIMATES_US
-
     def scan_loop_ns(self, program: Program) -> int:
         """Return the time of SCAN_LOOP, or of the block in its place, with its latch."""
         return self._scan_part(SCAN_LOOP.times, program)
@@ -102,28 +71,25 @@ class CostModel:
     @property
     def loop_ns(self) -> int:
         """The estimated time of a scan of a current minor loop."""
-        return self._estimate_ns("MinorLoop")
+        return self.estimate_ns(MINOR_LOOP_US)
 
     def end_ns(self, program: Program) -> int:
         """Return the time of END, including the write-back."""
         return self._scan_part(END_TIMES, program)
 
-    def statement_ns(self, statement: Statement) -> int:
-        """Return the estimated time of a BASIC statement without the statements inside it."""
-        if isinstance(statement, Remark):
-            time = self._time(REMARK_TIMES) if statement.costs else None
-            return 0 if time is None else _to_ns(time.base)
-        return self._estimate_ns(type(statement).__name__)
+    def remark_ns(self, remark: Remark) -> int:
+        """Return the time of a remark: only one that begins with ``!`` takes any."""
+        time = self._time(REMARK_TIMES) if remark.costs else None
+        return 0 if time is None else _to_ns(time.base)
 
     @property
     def turn_ns(self) -> int:
         """The estimated time of NEXT, for each turn of a FOR loop that reaches it."""
-        return self._estimate_ns("Next")
+        return self.estimate_ns(NEXT_US)
 
-    def _estimate_ns(self, statement: str) -> int:
-        if self.model is Model.NONE:
-            return 0
-        return _to_ns(STATEMENT_ESTIMATES_US.get(statement, 0.0) * SLOWER_THAN_7010.get(self.model, 1.0))
+    def estimate_ns(self, microseconds: float) -> int:
+        """Return the time of what takes so long on a 7010, by estimate."""
+        return 0 if self.model is Model.NONE else _to_ns(microseconds * SLOWER_THAN_7010.get(self.model, 1.0))
 
     def _scan_part(self, times: Times, program: Program) -> int:
         time = self._time(times)

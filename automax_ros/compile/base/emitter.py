@@ -78,6 +78,13 @@ class Emitter:
             self.emit(build.when(build.name(OVER), [self.log_call(build.name(OVER))]))
             self._overflows = False
 
+    @contextmanager
+    def block(self) -> Iterator[None]:
+        """Frame a block statement, in which latched commons have the values of the latch."""
+        self.in_block = True
+        yield
+        self.in_block = False
+
     def temporary(self) -> str:
         """Return the name of a new temporary of this statement."""
         self._temporaries += 1

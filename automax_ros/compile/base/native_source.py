@@ -16,7 +16,6 @@ class NotNative(Exception):
     """
 
     def __init__(self, reason: str, line: int = 0) -> None:
-        """Create the exception from the reason and the line of the task."""
         super().__init__(f"line {line}: {reason}" if line else reason)
         self.reason, self.line = reason, line
 

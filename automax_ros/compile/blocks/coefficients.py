@@ -110,7 +110,6 @@ class _Tree:
         self._body: list[ast.stmt] = [build.assign("bits", build.constant(0))]
 
     def function(self) -> ast.FunctionDef:
-        """Return the whole function."""
         for number, limit in enumerate(self._declared.limits):
             if limit.parameter in self._given:
                 self._limit(number, limit)

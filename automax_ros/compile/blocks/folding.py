@@ -57,7 +57,6 @@ class Fold(ast.NodeTransformer):
         helpers: Mapping[str, Callable[..., object]],
         tables: Mapping[str, TableReader] | None = None,
     ) -> None:
-        """Create the transformer from the expression for each name to replace, and the reader of each table."""
         self._bindings = bindings
         self._helpers = helpers
         self._tables = tables or {}
@@ -172,19 +171,14 @@ def fold_body(body: Iterable[ast.stmt], fold: Fold) -> list[ast.stmt]:
             folded.append(build.loop(fold.visit(statement.test), fold_body(statement.body, fold)))
         elif isinstance(statement, ast.Assign):
             assigned = ast.Assign([fold.visit(target) for target in statement.targets], fold.visit(statement.value))
-            if not _does_nothing(assigned):
+            target, given = assigned.targets[0], assigned.value
+            if not (isinstance(target, ast.Name) and isinstance(given, ast.Name) and target.id == given.id):
                 folded.append(assigned)
         elif isinstance(statement, ast.AugAssign):
             folded.append(ast.AugAssign(fold.visit(statement.target), statement.op, fold.visit(statement.value)))
         elif not isinstance(statement, ast.Pass):
             raise TypeError(f"a step function may not contain {type(statement).__name__}")
     return folded
-
-
-def _does_nothing(statement: ast.Assign) -> bool:
-    """Return whether an assignment gives a name its own value, as ``total = total + 0`` does once folded."""
-    target, value = statement.targets[0], statement.value
-    return isinstance(target, ast.Name) and isinstance(value, ast.Name) and target.id == value.id
 
 
 def _if(test: ast.expr, then: list[ast.stmt], otherwise: list[ast.stmt]) -> ast.If:
@@ -208,7 +202,6 @@ def without_dead_stores(body: list[ast.stmt], needed: set[str]) -> list[ast.stmt
 
 
 def _read(body: Iterable[ast.stmt]) -> set[str]:
-    """Return the names that statements read, not counting reads of a name for its own new value."""
     found: set[str] = set()
     for statement in body:
         if isinstance(statement, (ast.If, ast.While)):
@@ -226,7 +219,6 @@ def _names_read(node: ast.AST) -> set[str]:
 
 
 def _count(body: list[ast.stmt]) -> int:
-    """Return the number of statements, including those inside others."""
     inner = [statement for statement in body if isinstance(statement, (ast.If, ast.While))]
     return len(body) + sum(_count(statement.body) + _count(statement.orelse) for statement in inner)
 

@@ -69,7 +69,6 @@ def _stores(body: list[ast.stmt]) -> Counter[str]:
 
 
 def _without(body: list[ast.stmt], names: Mapping[str, ast.expr]) -> list[ast.stmt]:
-    """Return the body without the assignments to names."""
     kept: list[ast.stmt] = []
     for statement in body:
         if isinstance(statement, ast.If):
@@ -93,7 +92,6 @@ def log_in_place(body: list[ast.stmt], error: ast.expr, log: Callable[[ast.expr]
 
 
 def _only_literals(body: list[ast.stmt], name: str) -> bool:
-    """Return whether a local is set to literals only and read nowhere."""
     nodes = list(build.nodes(*body))
     if any(isinstance(node, ast.Name) and node.id == name and isinstance(node.ctx, ast.Load) for node in nodes):
         return False
@@ -260,11 +258,9 @@ class _StandIns:
         self._numbers: dict[str, str] = {}
 
     def of(self, name: str) -> str:
-        """Return the placeholder of a name."""
         return self._numbers.setdefault(name, f"_{len(self._numbers)}")
 
     def text(self, value: ast.expr) -> str:
-        """Return an expression as text, with the names replaced."""
         if isinstance(value, ast.Name):
             return self.of(value.id)
         return ast.unparse(_renamed(value, self.of))
@@ -425,7 +421,6 @@ def _direct_target(
 
 
 def _fleeting(block: Block, tree: StepTree) -> set[str]:
-    """Return the states that may have changed when the outputs are stored: those that get a new value."""
     states = [state.name for state in block.states]
     new = tree.results[len(block.outputs) : len(block.outputs) + len(states)]
     return {

@@ -21,42 +21,36 @@ MOST_PATHS = 64
 _TRACED_PACKAGE = "automax_ros.blocks."
 
 
+def _operations(
+    operator: type[ast.operator],
+) -> tuple[Callable[[Traced, object], Traced], Callable[[Traced, object], Traced]]:
+    """Return the method of an operator, and that for the right operand."""
+
+    def left(self: Traced, other: object) -> Traced:
+        return self.recorder.kept(ast.BinOp(self.node, operator(), node_of(other)))
+
+    def right(self: Traced, other: object) -> Traced:
+        return self.recorder.kept(ast.BinOp(node_of(other), operator(), self.node))
+
+    return left, right
+
+
+def _comparison(operator: type[ast.cmpop]) -> Callable[[Traced, object], Truth]:
+    return lambda self, other: Truth(self.recorder, ast.Compare(self.node, [operator()], [node_of(other)]))
+
+
 class Traced:
     """A REAL of which only the name is known."""
 
     def __init__(self, recorder: Recorder, node: ast.expr) -> None:
-        """Create the value from the recorder of operations and its name."""
         self.recorder, self.node = recorder, node
 
-    def _binary(self, operator: ast.operator, left: object, right: object) -> Traced:
-        return self.recorder.kept(ast.BinOp(node_of(left), operator, node_of(right)))
-
-    def _compare(self, operator: ast.cmpop, other: object) -> Truth:
-        return Truth(self.recorder, ast.Compare(self.node, [operator], [node_of(other)]))
-
-    def __add__(self, other: object) -> Traced:
-        return self._binary(ast.Add(), self, other)
-
-    def __radd__(self, other: object) -> Traced:
-        return self._binary(ast.Add(), other, self)
-
-    def __sub__(self, other: object) -> Traced:
-        return self._binary(ast.Sub(), self, other)
-
-    def __rsub__(self, other: object) -> Traced:
-        return self._binary(ast.Sub(), other, self)
-
-    def __mul__(self, other: object) -> Traced:
-        return self._binary(ast.Mult(), self, other)
-
-    def __rmul__(self, other: object) -> Traced:
-        return self._binary(ast.Mult(), other, self)
-
-    def __truediv__(self, other: object) -> Traced:
-        return self._binary(ast.Div(), self, other)
-
-    def __rtruediv__(self, other: object) -> Traced:
-        return self._binary(ast.Div(), other, self)
+    __add__, __radd__ = _operations(ast.Add)
+    __sub__, __rsub__ = _operations(ast.Sub)
+    __mul__, __rmul__ = _operations(ast.Mult)
+    __truediv__, __rtruediv__ = _operations(ast.Div)
+    __lt__, __le__, __gt__, __ge__ = map(_comparison, (ast.Lt, ast.LtE, ast.Gt, ast.GtE))
+    __eq__, __ne__ = map(_comparison, (ast.Eq, ast.NotEq))  # type: ignore[assignment]
 
     def __pow__(self, exponent: int) -> Traced | float:
         """Return a power with a whole exponent; the powers 0 and 1 are exact in every C library."""
@@ -69,24 +63,6 @@ class Traced:
 
     def __neg__(self) -> Traced:
         return self.recorder.kept(ast.UnaryOp(ast.USub(), self.node))
-
-    def __lt__(self, other: object) -> Truth:
-        return self._compare(ast.Lt(), other)
-
-    def __le__(self, other: object) -> Truth:
-        return self._compare(ast.LtE(), other)
-
-    def __gt__(self, other: object) -> Truth:
-        return self._compare(ast.Gt(), other)
-
-    def __ge__(self, other: object) -> Truth:
-        return self._compare(ast.GtE(), other)
-
-    def __eq__(self, other: object) -> Truth:  # type: ignore[override]
-        return self._compare(ast.Eq(), other)
-
-    def __ne__(self, other: object) -> Truth:  # type: ignore[override]
-        return self._compare(ast.NotEq(), other)
 
     def __bool__(self) -> bool:
         return bool(self != 0.0)
@@ -101,7 +77,6 @@ class Truth:
     """The comparison of two numbers; each evaluation follows one branch, a later run follows the other."""
 
     def __init__(self, recorder: Recorder, test: ast.expr) -> None:
-        """Create the comparison from the recorder and the test."""
         self.recorder, self.test = recorder, test
 
     def __bool__(self) -> bool:
@@ -118,7 +93,6 @@ class Recorder:
     """Records the operations of one run of a function after its last given answer."""
 
     def __init__(self, prefix: str, answers: Sequence[bool] = ()) -> None:
-        """Create the recorder from the prefix of the results' names, and the answer to each test."""
         self._prefix, self._answers = prefix, answers
         self._made, self._asked = 0, 0
         self.statements: list[ast.stmt] = []
@@ -159,14 +133,9 @@ def traced(
 ) -> list[ast.stmt]:
     """Return the operations of a function as statements that set ``results``.
 
-    Args:
-        function: it is called with the arguments ``before`` and a dictionary, and returns a value for each result in
-            order, or a single one, or a dictionary that has them under ``keys``.
-        before: known arguments.
-        numbers: the content of the dictionary: numbers, and names as trees.
-        results: names of the results.
-        prefix: prefix of the names of intermediate results.
-        keys: see above.
+    It is called with the arguments ``before`` and a dictionary ``numbers`` of numbers and names as trees, and returns a
+    value for each result in order, or a single one, or a dictionary that has them under ``keys``. ``prefix`` begins the
+    names of intermediate results.
 
     Raises:
         NotNative: the function needs the numbers themselves, or has too many paths.
@@ -228,5 +197,4 @@ def _with_traced_functions(value: Any, made: dict[int, Any]) -> Any:
 
 
 def _names(code: Any) -> list[str]:
-    """Return the names that a function and its inner functions look up."""
     return [*code.co_names, *(name for inner in code.co_consts if hasattr(inner, "co_names") for name in _names(inner))]

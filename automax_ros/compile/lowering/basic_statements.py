@@ -10,14 +10,14 @@ import ast
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 from automax_ros.compile.base import build
 from automax_ros.compile.base.layout import Role, StateField
 from automax_ros.compile.base.scan_io import MUST_WAIT, Suspension
 from automax_ros.compile.lowering.expressions import lower, of_type
 from automax_ros.compile.lowering.flow import Flow, is_jumping
-from automax_ros.compile.lowering.statements import GOSUB_DEPTH, StatementLowering
+from automax_ros.compile.lowering.statements import GOSUB_DEPTH, Row, StatementLowering
 from automax_ros.compile.lowering.stores import converted_to, printable, store
 from automax_ros.core.types import DataType
 from automax_ros.language.program import OpenedFile
@@ -53,12 +53,11 @@ class WaitingLowering(StatementLowering):
 
     blocks: int = 0
 
-    def _needs_blocks(self, statements: tuple[Statement, ...]) -> bool:  # noqa: ARG002
-        return True
+    _always_blocks: ClassVar[bool] = True
 
     def _jumps(self, statement: Statement) -> bool:
         """Return whether a statement waits or jumps; every FOR counts, so that a loop can suspend between two turns."""
-        if type(statement) in _WAITING or isinstance(statement, For):
+        if type(statement) in self._waiting or isinstance(statement, For):
             return True
         if isinstance(statement, If):
             return any(self._jumps(inner) for inner in (*statement.then, *statement.otherwise)) or is_jumping(
@@ -78,25 +77,14 @@ class WaitingLowering(StatementLowering):
             self.emitter.emit(_return(Suspension.BUSY, build.constant(0)))
         self.emitter.emit(flow.blocks_loop(BURST_LIMIT, too_many))
 
-    def _flow_one(self, flow: Flow, statement: Statement) -> None:
-        waiting = _WAITING.get(type(statement))
-        if waiting is not None:
-            waiting(self, flow, statement)
-        elif isinstance(statement, Stop):
-            self._charge(statement)
-            self.emitter.checkpoint()
-            self._next_block(flow, flow.to_next(), _return(Suspension.STOP, build.constant(0)))
-        else:
-            super()._flow_one(flow, statement)
-
-    def _charge(self, statement: Statement) -> None:
-        self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
+    def _stop(self, flow: Flow, _: Stop) -> None:
+        self.emitter.checkpoint()
+        self._next_block(flow, flow.to_next(), _return(Suspension.STOP, build.constant(0)))
 
     def _file(self, number: int) -> OpenedFile:
         return next(item for item in self.emitter.program.files if item.number == number)
 
     def _flag(self, number: int) -> str:
-        """Return the local that says whether a file is open."""
         name = f"file{number}_open"
         self.fields[name] = StateField(f"FILE {number}.open", DataType.BOOLEAN, Role.STACK, False)
         return name
@@ -283,9 +271,6 @@ class WaitingLowering(StatementLowering):
         self._log_if_closed(flag)
         self._next_block(flow)
 
-    def _get(self, flow: Flow, statement: Get) -> None:
-        self._wait_for_port(flow, statement)
-
     def _wait_for_port(self, flow: Flow, statement: InputFile | Get) -> None:
         """Emit input from a port, where nothing ever arrives (decision): wait for ever, or go to the line of EMPTY=."""
         self._charge(statement)
@@ -299,20 +284,24 @@ class WaitingLowering(StatementLowering):
         waits = [flow.to_next(), _return(Suspension.PORT, build.constant(statement.file))]
         self._next_block(flow, build.when(is_open, waits, [flow.to_next()]))
 
+    _waiting: ClassVar[dict[type, Row]] = {
+        WaitOn: Row(_wait_on, 20.0),
+        Delay: Row(_delay, 20.0),
+        StartEvery: Row(_start_every, 20.0),
+        OpenChannel: Row(_open_channel, 60.0),
+        OpenPort: Row(_open_port, 60.0),
+        Close: Row(_close, 30.0),
+        InputFile: Row(_input, 40.0),
+        PrintFile: Row(_print_file, 60.0),
+        Get: Row(_wait_for_port, 30.0),
+        Put: Row(_put, 40.0),
+    }
+    _flowing: ClassVar[dict[type, Row]] = {**StatementLowering._flowing, **_waiting, Stop: Row(_stop)}
+    estimates_us: ClassVar[dict[type, float]] = {
+        **StatementLowering.estimates_us,
+        **{kind: row.estimate_us for kind, row in _waiting.items()},
+    }
+
 
 def _return(why: Suspension, number: ast.expr) -> ast.stmt:
     return ast.Return(ast.Tuple([build.constant(int(why)), number], build.LOAD))
-
-
-_WAITING: dict[type[object], Callable[[WaitingLowering, Flow, Any], None]] = {
-    WaitOn: WaitingLowering._wait_on,
-    Delay: WaitingLowering._delay,
-    StartEvery: WaitingLowering._start_every,
-    OpenChannel: WaitingLowering._open_channel,
-    OpenPort: WaitingLowering._open_port,
-    Close: WaitingLowering._close,
-    InputFile: WaitingLowering._input,
-    PrintFile: WaitingLowering._print_file,
-    Get: WaitingLowering._get,
-    Put: WaitingLowering._put,
-}

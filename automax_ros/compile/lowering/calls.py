@@ -61,10 +61,8 @@ def lower_minor_loop(emitter: Emitter, bound: BoundCall) -> None:
     """Emit the loop's scan, after the latch."""
     emitter.line = bound.line
     emitter.mark_line(bound.line)
-    with emitter.statement(bound.line):
-        emitter.in_block = True
+    with emitter.statement(bound.line), emitter.block():
         _lower(emitter, bound)
-        emitter.in_block = False
 
 
 def _lower(emitter: Emitter, bound: BoundCall) -> None:
@@ -179,7 +177,6 @@ def _evaluated(bound: BoundCall, period_ns: int) -> tuple[str, ...]:
 
 
 def _literals(bound: BoundCall) -> dict[str, float]:
-    """Return the parameters of coefficients that are given as literals."""
     declared = bound.block.coefficients
     return {
         name: float(given.value)
@@ -190,9 +187,8 @@ def _literals(bound: BoundCall) -> dict[str, float]:
 
 def lower_block(emitter: Emitter, instance: BlockInstance) -> None:
     """Emit one block."""
-    emitter.in_block = True
-    _lower_block(emitter, instance)
-    emitter.in_block = False
+    with emitter.block():
+        _lower_block(emitter, instance)
 
 
 def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
@@ -295,18 +291,13 @@ def _tables(emitter: Emitter, bound: BoundCall) -> dict[str, TableReader]:
             continue
         given = bound.arguments.get(item.name)
         if given is None:
-            readers[item.variable] = _no_table
+            readers[item.variable] = lambda _: build.constant(0)  # never read
             continue
         assert isinstance(given, Reference)
         if emitter.symbol(given.name).scope is Scope.COMMON:
             emitter.checkpoint()
         readers[item.variable] = emitter.element_reader(given.name)
     return readers
-
-
-def _no_table(_index: ast.expr) -> ast.expr:
-    """Return a placeholder for an element of a table that is not programmed; it is never read."""
-    return build.constant(0)
 
 
 def block_value(emitter: Emitter, given: Expression) -> ast.expr:
@@ -322,7 +313,6 @@ def block_value(emitter: Emitter, given: Expression) -> ast.expr:
 
 
 def _real_value(emitter: Emitter, given: Expression) -> ast.expr:
-    """Return the value of a parameter for coefficients: a REAL, also where an INTEGER is given."""
     value = block_value(emitter, given)
     literal = value_of(value)
     if isinstance(literal, (int, float)):
@@ -331,7 +321,6 @@ def _real_value(emitter: Emitter, given: Expression) -> ast.expr:
 
 
 def _local(emitter: Emitter, target: Expression) -> str:
-    """Return the Python local in which an output is stored, "" where there is none or a force holds it."""
     if isinstance(target, Reference) and target.name not in emitter.held:
         symbol = emitter.symbol(target.name)
         if symbol.latched or target.name not in emitter.views:

@@ -145,7 +145,6 @@ class Flow:
         return build.loop(build.compare(build.name(PC), "<>", end), turns)
 
     def _whole(self, number: int) -> list[ast.stmt]:
-        """Return a block that counts its statements and takes another turn where it jumps back."""
         counted = [build.add_to(STEPS, build.constant(self.counts[number]))] if self.counts[number] else []
         return [*counted, *_turning(self.blocks[number], number)]
 

@@ -56,16 +56,8 @@ def begin_loop(emitter: Emitter, statement: For, place: str) -> Loop:
     stop_node = _kept(emitter, f"{prefix}_stop", stop.node)
     step_node = _kept(emitter, f"{prefix}_step", step.node)
     store(emitter, statement.variable, start)
-    loop = Loop(
-        statement,
-        place,
-        stop_node,
-        step_node,
-        stop.type,
-        step.type,
-        (stop.low, stop.high),
-        (step.low, step.high),
-    )
+    bounds = (stop.low, stop.high), (step.low, step.high)
+    loop = Loop(statement, place, stop_node, step_node, stop.type, step.type, *bounds)
     if loop.may_be_idle:
         is_zero = build.compare(step_node, "=", build.constant(0))
         emitter.emit(build.when(is_zero, [emitter.log_call(build.constant(STEP_IS_ZERO))]))
@@ -118,17 +110,12 @@ def end_turn(emitter: Emitter, loop: Loop) -> ast.expr | None:
 def _bounds_of_sum(emitter: Emitter, loop: Loop, present: Lowered) -> tuple[int, int]:
     """Return the bounds of variable + step; the loop's limit bounds a variable that nothing else sets."""
     low, high = present.low + loop.step_bounds[0], present.high + loop.step_bounds[1]
-    if loop.stop_type is not DataType.REAL and _only_counts(emitter, loop):
+    if loop.stop_type is not DataType.REAL and counts_alone(emitter.program, loop.statement):
         if loop.step_bounds[0] >= 0:
             high = min(high, loop.stop_bounds[1] + loop.step_bounds[1])
         elif loop.step_bounds[1] < 0:
             low = max(low, loop.stop_bounds[0] + loop.step_bounds[0])
     return low, high
-
-
-def _only_counts(emitter: Emitter, loop: Loop) -> bool:
-    """Return whether only the loop itself can set its variable while it runs."""
-    return counts_alone(emitter.program, loop.statement)
 
 
 def counts_alone(program: Program, loop: For) -> bool:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple
 
 from automax_ros.compile.base import build
+from automax_ros.compile.base.cost import CostModel
 from automax_ros.compile.base.emitter import Emitter
 from automax_ros.compile.base.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
 from automax_ros.compile.base.layout import Role, StateField
 from automax_ros.compile.lowering.calls import BlockInstance, lower_block
 from automax_ros.compile.lowering.expressions import lower, of_type
 from automax_ros.compile.lowering.flow import (
-    JUMPS,
     PC,
     STEPS,
     Flow,
@@ -33,7 +34,6 @@ from automax_ros.language.tree.tree import (
     Declaration,
     End,
     Event,
-    Expression,
     For,
     Gosub,
     Goto,
@@ -58,6 +58,13 @@ GOSUB_TOO_DEEP, RETURN_WITHOUT_GOSUB, OUT_OF_DATA = 7028, 7029, 7030
 STOPPED = "stopped"
 
 
+class Row(NamedTuple):
+    """The lowering of a kind of statement, and its estimated time on a 7010, microseconds; a CALL's is its block's."""
+
+    carry_out: Callable[..., None]
+    estimate_us: float = 0.0
+
+
 @dataclass
 class StatementLowering:
     """Lowers the statements of one function into an emitter; ``instances`` are the blocks by the CALL's span.
@@ -74,21 +81,18 @@ class StatementLowering:
     _repeating: int = 0
     _targets: frozenset[int] = frozenset()
     _loops: dict[int, int] = field(default_factory=dict)
+    _always_blocks: ClassVar[bool] = False
 
     def lower_all(self, statements: tuple[Statement, ...]) -> None:
         """Emit the statements; END after them is left to the caller."""
         statements = before_end(statements)
         self._targets = jump_targets(statements)
-        if self._needs_blocks(statements):
+        if self._always_blocks or any(self._jumps(statement) for statement in statements):
             self._lower_blocks(statements)
         else:
             self._lower_straight(statements)
 
-    def _needs_blocks(self, statements: tuple[Statement, ...]) -> bool:
-        return any(self._jumps(statement) for statement in statements)
-
     def _jumps(self, statement: Statement) -> bool:
-        """Return whether a statement cannot be straight code."""
         return is_jumping(statement, self._targets)
 
     # Straight code
@@ -106,7 +110,7 @@ class StatementLowering:
 
     def _straight_if(self, statement: If) -> None:
         line = self.emitter.line
-        condition = self._condition(statement.condition, statement)
+        condition = self._condition(statement)
         with self.emitter.suite() as then:
             self._branch(statement.then)
         with self.emitter.suite() as otherwise:
@@ -150,7 +154,7 @@ class StatementLowering:
     def _begin_loop(self, statement: For) -> Loop:
         line = self.emitter.line
         with self.emitter.statement(line):
-            self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
+            self._charge(statement)
             self._loops[line] = self._loops.get(line, 0) + 1
             place = f"{line}" if self._loops[line] == 1 else f"{line}.{self._loops[line]}"
             loop = begin_loop(self.emitter, statement, place)
@@ -205,30 +209,25 @@ class StatementLowering:
                 self._lower_straight((statement,))
 
     def _flow_one(self, flow: Flow, statement: Statement) -> None:
-        if isinstance(statement, (*JUMPS, If)):  # the others add their time themselves
-            self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
-        if isinstance(statement, Goto):
-            self._next_block(flow, flow.to_line(statement.line))
-        elif isinstance(statement, If):
-            self._flow_if(flow, statement)
-        elif isinstance(statement, For):
-            self._flow_for(flow, statement)
-        elif isinstance(statement, Gosub):
-            self._next_block(flow, *self._gosub(flow, flow.to_line(statement.line)))
-        elif isinstance(statement, OnJump):
-            self._flow_on(flow, statement)
-        elif isinstance(statement, Return):
-            self._next_block(flow, *self._return(flow))
-        elif isinstance(statement, Stop):
-            self.can_stop = True
-            self._next_block(flow, build.assign(STOPPED, build.constant(True)), flow.to_end())
-        elif isinstance(statement, End):
-            self._next_block(flow, flow.to_end())
-        else:
+        row = self._flowing.get(type(statement))
+        if row is None:
             self._lower_simple(statement)
+        else:
+            row.carry_out(self, flow, statement)
+
+    def _goto(self, flow: Flow, statement: Goto) -> None:
+        self._charge(statement)
+        self._next_block(flow, flow.to_line(statement.line))
+
+    def _end(self, flow: Flow, _: End) -> None:
+        self._next_block(flow, flow.to_end())
+
+    def _stop(self, flow: Flow, _: Stop) -> None:
+        self.can_stop = True
+        self._next_block(flow, build.assign(STOPPED, build.constant(True)), flow.to_end())
 
     def _flow_if(self, flow: Flow, statement: If) -> None:
-        condition = self._condition(statement.condition, statement, costed=True)
+        condition = self._condition(statement)
         otherwise_at, end_at = flow.later(), flow.later()
         jump = build.when(condition, [flow.to_next()], [build.assign(PC, otherwise_at)])
         if len(statement.then) == 1 and isinstance(statement.then[0], Goto) and not statement.otherwise:
@@ -270,16 +269,21 @@ class StatementLowering:
         flow.here(after_at)
 
     def _flow_on(self, flow: Flow, statement: OnJump) -> None:
+        self._charge(statement)
         with self.emitter.statement(self.emitter.line):
             selector = self.emitter.keep(lower(self.emitter, statement.selector).node)
         blocks = ast.Tuple([flow.block_of(line) for line in statement.lines], build.LOAD)
         jump = build.assign(PC, ast.Subscript(blocks, build.binary(selector, "-", build.constant(1)), build.LOAD))
-        taken: list[ast.stmt] = self._gosub(flow, jump) if statement.gosub else [jump]
+        taken: list[ast.stmt] = self._calling(flow, jump) if statement.gosub else [jump]
         count = build.constant(len(statement.lines))
         in_list = ast.Compare(build.constant(1), [ast.LtE(), ast.LtE()], [selector, count])
         self._next_block(flow, build.when(in_list, taken, [flow.to_next()]))
 
-    def _gosub(self, flow: Flow, jump: ast.stmt) -> list[ast.stmt]:
+    def _gosub(self, flow: Flow, statement: Gosub) -> None:
+        self._charge(statement)
+        self._next_block(flow, *self._calling(flow, flow.to_line(statement.line)))
+
+    def _calling(self, flow: Flow, jump: ast.stmt) -> list[ast.stmt]:
         self.fields["gosub_lines"] = StateField(
             "GOSUB.blocks", DataType.DOUBLE, Role.STACK, 0, GOSUB_DEPTH, is_array=True
         )
@@ -293,16 +297,17 @@ class StatementLowering:
         skip = [self.emitter.log_call(build.constant(GOSUB_TOO_DEEP)), flow.to_next()]
         return [build.when(build.compare(depth, "<", build.constant(GOSUB_DEPTH)), call, skip)]
 
-    def _return(self, flow: Flow) -> list[ast.stmt]:
+    def _return(self, flow: Flow, statement: Return) -> None:
+        self._charge(statement)
         if "gosub_depth" not in self.fields:
-            self._gosub(flow, flow.to_next())
+            self._calling(flow, flow.to_next())
         depth = build.name("gosub_depth")
-        back = [
+        back: list[ast.stmt] = [
             build.add_to("gosub_depth", build.constant(-1)),
             build.assign(PC, build.item("gosub_lines", depth)),
         ]
         go_on = [self.emitter.log_call(build.constant(RETURN_WITHOUT_GOSUB)), flow.to_next()]
-        return [build.when(depth, list[ast.stmt](back), go_on)]
+        self._next_block(flow, build.when(depth, back, go_on))
 
     # Single statements
 
@@ -310,22 +315,23 @@ class StatementLowering:
         if statement.number is not None:
             self.emitter.line = statement.number
 
-    def _condition(self, expression: Expression, statement: Statement, *, costed: bool = False) -> ast.expr:
+    def _charge(self, statement: Statement) -> None:
+        self.emitter.add_cost(self.statement_ns(self.emitter.cost_model, statement))
+
+    def _condition(self, statement: If) -> ast.expr:
         with self.emitter.statement(self.emitter.line):
-            if not costed:
-                self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
-            condition = lower(self.emitter, expression).node
+            self._charge(statement)
+            condition = lower(self.emitter, statement.condition).node
         self.emitter.book_cost()
         return condition
 
     def _lower_simple(self, statement: Statement) -> None:
-        if isinstance(statement, _NOTHING_TO_DO):
-            return
-        carry_out = _SIMPLE[type(statement)]
+        row = self._simple.get(type(statement))
+        if row is None:
+            raise TypeError(f"no lowering of {type(statement).__name__}")
         with self.emitter.statement(self.emitter.line):
-            if not isinstance(statement, Call):
-                self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
-            carry_out(self, statement)
+            self._charge(statement)
+            row.carry_out(self, statement)
 
     def _assign(self, statement: Assignment) -> None:
         store(self.emitter, statement.target, lower(self.emitter, statement.value))
@@ -392,20 +398,38 @@ class StatementLowering:
         self.emitter.checkpoint()
         self.emitter.emit(build.do(build.call(self.emitter.member("set_event"), build.constant(statement.event))))
 
-    def _remark(self, _: Remark) -> None:
-        """Emit nothing for a remark; its time is added by the frame of every statement."""
+    def _nothing(self, _: Statement) -> None:
+        pass
 
+    _flowing: ClassVar[dict[type, Row]] = {
+        Goto: Row(_goto, 2.0),
+        Gosub: Row(_gosub, 4.0),
+        Return: Row(_return, 3.0),
+        OnJump: Row(_flow_on, 5.0),
+        If: Row(_flow_if, 4.0),
+        For: Row(_flow_for, 8.0),
+        Stop: Row(_stop),
+        End: Row(_end),
+    }
+    _simple: ClassVar[dict[type, Row]] = {
+        Assignment: Row(_assign, 6.0),
+        Call: Row(_call),
+        Print: Row(_print, 60.0),
+        Read: Row(_read, 6.0),
+        Restore: Row(_restore, 2.0),
+        IoWrite: Row(_io_write, 10.0),
+        ClearErrorLog: Row(_clear_log, 4.0),
+        SetEvent: Row(_set_event, 12.0),
+        **dict.fromkeys((Remark, Declaration, Data, Event, Label), Row(_nothing)),
+    }
+    estimates_us: ClassVar[dict[type, float]] = {
+        kind: row.estimate_us for kind, row in (*_flowing.items(), *_simple.items()) if row.estimate_us
+    }
+    """Estimated microseconds on a 7010 by kind of BASIC statement; others take none (decision)."""
 
-_NOTHING_TO_DO = (Declaration, Data, Event, Label)
-_Carry = Callable[[StatementLowering, Statement], None]
-_SIMPLE: dict[type, _Carry] = {
-    Assignment: StatementLowering._assign,  # type: ignore[dict-item]
-    Call: StatementLowering._call,  # type: ignore[dict-item]
-    Print: StatementLowering._print,  # type: ignore[dict-item]
-    Read: StatementLowering._read,  # type: ignore[dict-item]
-    Restore: StatementLowering._restore,  # type: ignore[dict-item]
-    IoWrite: StatementLowering._io_write,  # type: ignore[dict-item]
-    ClearErrorLog: StatementLowering._clear_log,  # type: ignore[dict-item]
-    Remark: StatementLowering._remark,  # type: ignore[dict-item]
-    SetEvent: StatementLowering._set_event,  # type: ignore[dict-item]
-}
+    @classmethod
+    def statement_ns(cls, model: CostModel, statement: Statement) -> int:
+        """Return the time of a statement without those inside it: but for remarks, an estimate."""
+        if isinstance(statement, Remark):
+            return model.remark_ns(statement)
+        return model.estimate_ns(cls.estimates_us.get(type(statement), 0.0))

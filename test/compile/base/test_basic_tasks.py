@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.compile.base.cost import STATEMENT_ESTIMATES_US, CostModel, Model
+from automax_ros.compile.base.cost import CostModel, Model
 from automax_ros.compile.base.scan_io import Suspension
 from automax_ros.compile.lowering.basic_statements import BURST_LIMIT
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.runtime.scan.channels import Channels
 from automax_ros.runtime.tasks.task import Status
-from compile.support import TICK, basic_task_of, repeatable
+from compile.support import ESTIMATES_US, TICK, basic_task_of, repeatable
 
 
 def text(*statements: str, declare: str = "LOCAL A%, B%, I%, J%, X, S$, F@, T%(5)") -> str:
@@ -154,7 +154,7 @@ def test_a_burst_in_steps_takes_the_estimates_of_its_statements() -> None:
     task, _ = basic_task_of(source, cost_model=CostModel(Model.MODEL_7010))
     task.run(0)
     steps = [ns for ns in task.scan_modeled(0) if ns]
-    assign, delay = (round(STATEMENT_ESTIMATES_US[word] * 1000) for word in ("Assignment", "Delay"))
+    assign, delay = (round(ESTIMATES_US[word] * 1000) for word in ("Assignment", "Delay"))
     assert steps == [2 * assign, delay]
 
 

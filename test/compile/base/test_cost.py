@@ -7,9 +7,9 @@ import pytest
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Access, Block, Form, Input, Output, Platform, Special
 from automax_ros.blocks.declare.rules import AtLeast, Contiguous, NumberTrue
-from automax_ros.compile.base.cost import STATEMENT_ESTIMATES_US, CostModel, Model
+from automax_ros.compile.base.cost import CostModel, Model
 from automax_ros.core.types import DataType
-from compile.support import lines, scan_in_steps, task_of
+from compile.support import ESTIMATES_US, lines, scan_in_steps, task_of
 
 BLOCKS = """10 COMMON A%, B%, C%, D!, X@, Y@
 20 LOCAL Z@
@@ -131,7 +131,7 @@ def test_cost_is_yielded_before_each_access_to_actual_memory():
 """
     scan_loop, end = 80.0 + 3 * (1.6 + 2.5), 13.82 + 3 * (2.0 + 1.6)
     steps = times(Model.MODEL_7010, text)
-    expected = [scan_loop, STATEMENT_ESTIMATES_US["Assignment"], 0.0, 11.28 + end]
+    expected = [scan_loop, ESTIMATES_US["Assignment"], 0.0, 11.28 + end]
     assert steps == [pytest.approx(value * 1000, abs=1) for value in expected]
 
 
@@ -146,16 +146,16 @@ def test_only_what_is_executed_takes_time(jump):
             sum(times(Model.MODEL_7010, lines("A% = 3", "REM", jump or "REM", *statements, "20000 REM"))) - base
         ) / 1000
 
-    condition = STATEMENT_ESTIMATES_US["If"]
+    condition = ESTIMATES_US["If"]
     assert extra("IF A% = 3 THEN", summer, "END_IF") == pytest.approx(condition + 11.28)
     assert extra("IF A% = 4 THEN", summer, "END_IF") == pytest.approx(condition)
     assert extra("IF A% = 4 THEN", summer, "ELSE", summer, summer, "END_IF") == pytest.approx(condition + 22.56)
     turns = extra("FOR B% = 1 TO 3", summer.replace("=B%)", "=C%)"), "NEXT B%")
-    assert turns == pytest.approx(STATEMENT_ESTIMATES_US["For"] + 3 * (11.28 + STATEMENT_ESTIMATES_US["Next"]))
+    assert turns == pytest.approx(ESTIMATES_US["For"] + 3 * (11.28 + ESTIMATES_US["Next"]))
     empty = extra("FOR B% = 1 TO 3", "NEXT B%")
-    assert empty == pytest.approx(STATEMENT_ESTIMATES_US["For"] + 3 * STATEMENT_ESTIMATES_US["Next"])
+    assert empty == pytest.approx(ESTIMATES_US["For"] + 3 * ESTIMATES_US["Next"])
     read = extra("T%(A%) = T%(A% + 5)")
-    assert read == pytest.approx(STATEMENT_ESTIMATES_US["Assignment"])
+    assert read == pytest.approx(ESTIMATES_US["Assignment"])
 
 
 def test_read_past_the_data_takes_its_time_too():

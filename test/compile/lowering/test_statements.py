@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
+from automax_ros.compile.compiler import compile_program
 from automax_ros.runtime.tasks.task import Status, Task
-from compile.support import OTHER, lines, logged, ran, run_scans, scan_in_steps, task_of
+from compile.support import OTHER, lines, logged, program_of, ran, run_scans, scan_in_steps, task_of
 
 
 @pytest.fixture(params=["at once", "in steps"])
@@ -289,3 +292,10 @@ def test_what_runs_before_scan_loop_uses_actual_memory_once():
     assert (memory.read_now(0), task.value("A%")) == (6, 6)
     task.run()
     assert memory.read_now(0) == 11
+
+
+def test_a_statement_without_a_lowering_is_an_error():
+    unknown = dataclasses.make_dataclass("Unknown", ["number"])(100)
+    program = dataclasses.replace(program_of(lines("A% = 1")), scan=(unknown,))
+    with pytest.raises(TypeError, match="no lowering of Unknown"):
+        compile_program(program, {})

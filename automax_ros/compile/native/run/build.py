@@ -124,7 +124,6 @@ def python_options() -> tuple[str, ...]:
 
 
 def _stamp(path: str) -> tuple[int, int]:
-    """Return time and size of a compiler's file, which change with the compiler."""
     known = os.stat(path)
     return known.st_mtime_ns, known.st_size
 

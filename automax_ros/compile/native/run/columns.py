@@ -75,8 +75,6 @@ class _Rows(ctypes.Structure):
 
 
 class _Call(ctypes.Structure):
-    """``automax_columns_call``."""
-
     _fields_ = [
         ("count", ctypes.c_int64),
         ("latched", ctypes.c_void_p),
@@ -200,11 +198,9 @@ class _Run:
 
     @property
     def done(self) -> int:
-        """The number of complete scans."""
         return int(self.call.done)
 
     def executed(self) -> Executed:
-        """Return the result."""
         done, errors, written = self.done, self.call.errors, self.call.written
         scans, views, elements = (item[:written].copy() for item in self._places)
         return Executed(

@@ -203,7 +203,6 @@ def _printed(process: subprocess.Popen[str], limit_s: float) -> tuple[str, str]:
 
 
 def _failure(name: str, code: int, complaints: str, memory: int) -> str:
-    """Return the reason why there is no library."""
     lines = complaints.strip().splitlines() or [f"exit code {code}"]
     if any(words in complaints for words in _NO_MEMORY):
         return f"{name} has not enough memory for it, of which it may have {memory >> 20:,} MB: divide the task"

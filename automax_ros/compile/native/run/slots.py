@@ -31,7 +31,6 @@ class StateSlots:
     """The slots of one layout. ``limits`` are the least and greatest integers of each field, () for any 64 bits."""
 
     def __init__(self, layout: Layout, limits: Sequence[tuple[int, int]] = ()) -> None:
-        """Create the slots of a layout."""
         self._fields = layout.fields
         self._limits = tuple(limits) or (_INT64,) * len(layout.fields)
         self._size = sum(field.size for field in layout.fields)

@@ -151,8 +151,6 @@ def native_form(
 
 
 def _forced_in_python(compiled: CompiledTask) -> Scans:
-    """Return the Python form that applies forces, compiled on demand."""
-
     def scans(state: StateValues, io: ScanIo) -> Generator[bool, None, None]:
         return compiled.scans_forced(state, io)
 

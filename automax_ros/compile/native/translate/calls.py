@@ -138,7 +138,6 @@ def _results(made: Frame) -> list[Range]:
 
 
 def _defined(made: Frame, name: str, parameters: list[str], ranges: list[Range]) -> str:
-    """Return the name in C of a function."""
     results = [c_type(item) for item in _results(made)]
     given = [f"{c_type(item)} {parameter}" for parameter, item in zip(parameters, ranges, strict=True)]
     given += [f"{kind} *result_{number}" for number, kind in enumerate(results[1:], 1)]

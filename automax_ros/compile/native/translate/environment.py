@@ -1,13 +1,10 @@
-"""The known range of each name that has a value, at one place of a function, and the interface to that function."""
+"""The known range of each name that has a value, at one place of a function."""
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Iterator, Mapping
 
 from automax_ros.compile.native.translate.ranges import Range
-from automax_ros.compile.native.translate.typed import Typed
 
 _MOST_CHANGES = 128
 """Changes after which a new base is made: a copy costs all changes, a base costs all names of a task."""
@@ -22,7 +19,6 @@ class Environment:
     __slots__ = ("_base", "_changes")
 
     def __init__(self, base: Mapping[str, Range], changes: dict[str, Range | None] | None = None) -> None:
-        """Create it from known ranges, which must not change any more, and changes: None for a name without value."""
         self._base = base
         self._changes: dict[str, Range | None] = {} if changes is None else changes
 
@@ -32,7 +28,6 @@ class Environment:
         return changes[name] if name in changes else self._base.get(name)
 
     def __getitem__(self, name: str) -> Range:
-        """Return the range of a name that has a value."""
         found = self.get(name)
         if found is None:
             raise KeyError(name)
@@ -113,39 +108,3 @@ def joined(first: Environment | None, second: Environment | None) -> Environment
     if first is None or second is None:
         return second if first is None else first
     return first.joined(second)
-
-
-class Context(Protocol):
-    """A function under translation."""
-
-    def value(self, node: ast.expr, known: Environment) -> Typed:
-        """Return an expression in C."""
-        ...
-
-    def refined(self, test: ast.expr, known: Environment, *, truth: bool) -> Environment | None:
-        """Return the known ranges where a test has the result ``truth``; None where it cannot."""
-        ...
-
-    def read(self, name: str, known: Environment) -> Typed:
-        """Return a variable, or a constant of the module."""
-        ...
-
-    def attribute(self, node: ast.Attribute) -> object:
-        """Return a constant of a module, such as ``math.pi``."""
-        ...
-
-    def element(self, name: str, index: ast.expr, known: Environment) -> Typed:
-        """Return an element of an array or of a named tuple of constants."""
-        ...
-
-    def constants(self, values: Sequence[object], index: ast.expr, known: Environment) -> Typed:
-        """Return an element of a tuple of constants."""
-        ...
-
-    def call(self, node: ast.Call, known: Environment) -> list[Typed]:
-        """Return the results of a call."""
-        ...
-
-    def ended(self) -> str:
-        """Return the argument by which a function reports that the scan ends here; the statement then checks it."""
-        ...

@@ -5,11 +5,11 @@ from __future__ import annotations
 import ast
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.blocks.folding import value_of
-from automax_ros.compile.native.translate.environment import Context, Environment
+from automax_ros.compile.native.translate.environment import Environment
 from automax_ros.compile.native.translate.ranges import (
     ANY_BOOL,
     ANY_REAL,
@@ -22,6 +22,9 @@ from automax_ros.compile.native.translate.ranges import (
     span,
 )
 from automax_ros.compile.native.translate.typed import WIDE, Typed, as_real, bare, c_type, literal, widened
+
+if TYPE_CHECKING:
+    from automax_ros.compile.native.translate.frame import Frame
 
 _SUMS: dict[type[ast.operator], tuple[str, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", operator.add),
@@ -39,7 +42,7 @@ _RELATIONS: dict[type[ast.cmpop], str] = {
 }
 
 
-def value(frame: Context, node: ast.expr, known: Environment) -> Typed:
+def value(frame: Frame, node: ast.expr, known: Environment) -> Typed:
     """Return an expression in C.
 
     Raises:
@@ -53,20 +56,15 @@ def value(frame: Context, node: ast.expr, known: Environment) -> Typed:
     return result
 
 
-def condition(frame: Context, node: ast.expr, known: Environment) -> str:
-    """Return an expression as a condition of C: Python's truth of a number is that of C."""
-    return value(frame, node, known).text
-
-
-def _constant(_: Context, node: ast.Constant, __: Environment) -> Typed:
+def _constant(_: Frame, node: ast.Constant, __: Environment) -> Typed:
     return literal(node.value)
 
 
-def _name(frame: Context, node: ast.Name, known: Environment) -> Typed:
+def _name(frame: Frame, node: ast.Name, known: Environment) -> Typed:
     return frame.read(node.id, known)
 
 
-def _unary(frame: Context, node: ast.UnaryOp, known: Environment) -> Typed:
+def _unary(frame: Frame, node: ast.UnaryOp, known: Environment) -> Typed:
     number = value_of(node)
     if number is not None:
         return literal(number)
@@ -99,7 +97,7 @@ def _wide_or_signed(left: Typed, result: Range, *others: Typed) -> str:
     return left.signed
 
 
-def _binary(frame: Context, node: ast.BinOp, known: Environment) -> Typed:
+def _binary(frame: Frame, node: ast.BinOp, known: Environment) -> Typed:
     left, right = value(frame, node.left, known), value(frame, node.right, known)
     kind = type(node.op)
     if kind is ast.Pow and left.range.only is not None and right.range.only is not None:
@@ -150,7 +148,7 @@ def _bitwise(left: Typed, right: Typed, sign: str) -> Typed:
     return _whole_result(f"{_wide_or_signed(left, result, right)} {sign} {right.text}", result, left, right)
 
 
-def _quotient(frame: Context, left: Typed, right: Typed) -> Typed:
+def _quotient(frame: Frame, left: Typed, right: Typed) -> Typed:
     if not (left.range.is_exact and right.range.is_exact):
         raise NotNative("the true quotient of integers beyond 53 bits")
     top, bottom = as_real(left), as_real(right)
@@ -161,7 +159,7 @@ def _quotient(frame: Context, left: Typed, right: Typed) -> Typed:
     )
 
 
-def _not_zero(frame: Context, right: Typed) -> Typed:
+def _not_zero(frame: Frame, right: Typed) -> Typed:
     """Return a divisor that is not 0: where that cannot be proved, the scan ends if it is 0."""
     low, high = right.range.low, right.range.high
     if not low <= 0 <= high:
@@ -174,7 +172,7 @@ def _not_zero(frame: Context, right: Typed) -> Typed:
     )
 
 
-def _floor_quotient(frame: Context, left: Typed, right: Typed) -> Typed:
+def _floor_quotient(frame: Frame, left: Typed, right: Typed) -> Typed:
     right = _not_zero(frame, right)
     result = _quotients(left.range, right.range)
     if left.range.low >= 0 and right.range.low > 0:
@@ -194,7 +192,7 @@ def _quotients(left: Range, right: Range) -> Range:
     return span(parts)
 
 
-def _remainder(frame: Context, left: Typed, right: Typed) -> Typed:
+def _remainder(frame: Frame, left: Typed, right: Typed) -> Typed:
     right = _not_zero(frame, right)
     least = right.range.low + 1 if right.range.low < 0 else 0
     most = right.range.high - 1 if right.range.high > 0 else 0
@@ -219,7 +217,7 @@ def _shift(number: Typed, count: Typed, *, left: bool) -> Typed:
     return _whole_result(f"{_wide_or_signed(number, result)} {sign} {count.text}", result, number)
 
 
-def _compare(frame: Context, node: ast.Compare, known: Environment) -> Typed:
+def _compare(frame: Frame, node: ast.Compare, known: Environment) -> Typed:
     operands = [value(frame, item, known) for item in (node.left, *node.comparators)]
     parts = [
         _relation(left, _RELATIONS[type(sign)], right)
@@ -242,7 +240,7 @@ def _compares(whole: Range, real: Range) -> bool:
     return real.kind is Kind.REAL and real.low > -EXACT_IN_DOUBLE and real.high < EXACT_IN_DOUBLE
 
 
-def _bool_op(frame: Context, node: ast.BoolOp, known: Environment) -> Typed:
+def _bool_op(frame: Frame, node: ast.BoolOp, known: Environment) -> Typed:
     """Return ``and`` or ``or``: of booleans a boolean, of integers the operand that decides."""
     both = isinstance(node.op, ast.And)
     operands: list[Typed] = []
@@ -259,8 +257,8 @@ def _bool_op(frame: Context, node: ast.BoolOp, known: Environment) -> Typed:
     return Typed(text, result)
 
 
-def _if_exp(frame: Context, node: ast.IfExp, known: Environment) -> Typed:
-    test = condition(frame, node.test, known)
+def _if_exp(frame: Frame, node: ast.IfExp, known: Environment) -> Typed:
+    test = value(frame, node.test, known).text
     then, otherwise = (frame.refined(node.test, known, truth=truth) for truth in (True, False))
     if then is None:
         return value(frame, node.orelse, known if otherwise is None else otherwise)
@@ -271,11 +269,10 @@ def _if_exp(frame: Context, node: ast.IfExp, known: Environment) -> Typed:
 
 
 def _branch(item: Typed) -> str:
-    """Return one of the values between which C chooses: an integer in 64 bits."""
     return item.signed if item.range.kind is Kind.INT else item.text
 
 
-def _subscript(frame: Context, node: ast.Subscript, known: Environment) -> Typed:
+def _subscript(frame: Frame, node: ast.Subscript, known: Environment) -> Typed:
     if isinstance(node.value, ast.Tuple):
         return frame.constants(
             [item.value for item in node.value.elts if isinstance(item, ast.Constant)], node.slice, known
@@ -285,14 +282,14 @@ def _subscript(frame: Context, node: ast.Subscript, known: Environment) -> Typed
     return frame.element(node.value.id, node.slice, known)
 
 
-def _call(frame: Context, node: ast.Call, known: Environment) -> Typed:
+def _call(frame: Frame, node: ast.Call, known: Environment) -> Typed:
     results = frame.call(node, known)
     if len(results) != 1:
         raise NotNative("several results where one is used")
     return results[0]
 
 
-def _attribute(frame: Context, node: ast.Attribute, _: Environment) -> Typed:
+def _attribute(frame: Frame, node: ast.Attribute, _: Environment) -> Typed:
     return literal(frame.attribute(node))
 
 
@@ -322,7 +319,7 @@ def _extreme_range(kind: Kind, first: Range, second: Range, *, least: bool) -> R
     return Range(kind, low, high, kind is Kind.REAL and first.is_number)
 
 
-_EXPRESSIONS: dict[type[ast.expr], Callable[[Context, Any, Environment], Typed]] = {
+_EXPRESSIONS: dict[type[ast.expr], Callable[[Frame, Any, Environment], Typed]] = {
     ast.Constant: _constant,
     ast.Name: _name,
     ast.UnaryOp: _unary,

@@ -71,12 +71,15 @@ def _log(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
     return [Typed(f"log_error(host, {line}, {code}, {frame.ended()})", ANY_BOOL)]
 
 
-def _errors_logged(frame: Frame, _: ast.Call, __: Environment) -> list[Typed]:
-    return [Typed(f"errors_logged(host, {frame.ended()})", ANY_BOOL)]
+def _plain(function: str) -> Member:
+    return lambda frame, _, __: [Typed(f"{function}(host, {frame.ended()})", ANY_BOOL)]
 
 
-def _clear_errors(frame: Frame, _: ast.Call, __: Environment) -> list[Typed]:
-    return [Typed(f"clear_errors(host, {frame.ended()})", ANY_BOOL)]
+def _refused(what: str) -> Member:
+    def refuse(_: Frame, __: ast.Call, ___: Environment) -> list[Typed]:
+        raise NotNative(what)
+
+    return refuse
 
 
 def _io_read(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
@@ -97,30 +100,14 @@ def _io_write(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
     return [Typed(f"io_write(host, {arguments}, {frame.ended()})", Range(Kind.INT, 0, INT32_MAX))]
 
 
-def _latch(_: Frame, __: ast.Call, ___: Environment) -> list[Typed]:
-    return []
-
-
-def _print(_: Frame, __: ast.Call, ___: Environment) -> list[Typed]:
-    raise NotNative("PRINT")
-
-
-def _event(_: Frame, __: ast.Call, ___: Environment) -> list[Typed]:
-    raise NotNative("SET of an event")
-
-
-def _minor_loop(_: Frame, __: ast.Call, ___: Environment) -> list[Typed]:
-    raise NotNative("the current minor loop of a drive")
-
-
 _MEMBERS: dict[str, Member] = {
-    "latch": _latch,
+    "latch": lambda _, __, ___: [],
     "log": _log,
-    "errors_logged": _errors_logged,
-    "clear_errors": _clear_errors,
+    "errors_logged": _plain("errors_logged"),
+    "clear_errors": _plain("clear_errors"),
     "io_read": _io_read,
     "io_write": _io_write,
-    "print_line": _print,
-    "set_event": _event,
-    "minor_loop": _minor_loop,
+    "print_line": _refused("PRINT"),
+    "set_event": _refused("SET of an event"),
+    "minor_loop": _refused("the current minor loop of a drive"),
 }

@@ -23,7 +23,6 @@ class Kind(enum.Enum):
     REAL = "double"
 
     def __init__(self, c_type: str) -> None:
-        """Set the type in C."""
         self.c_type = c_type
 
 

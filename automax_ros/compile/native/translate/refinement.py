@@ -5,9 +5,13 @@ from __future__ import annotations
 import ast
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from automax_ros.compile.native.translate.environment import Context, Environment, joined
+from automax_ros.compile.native.translate.environment import Environment, joined
 from automax_ros.compile.native.translate.ranges import INFINITE, Range
+
+if TYPE_CHECKING:
+    from automax_ros.compile.native.translate.frame import Frame
 
 _OPPOSITE: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.GtE,
@@ -27,7 +31,7 @@ _MIRRORED: dict[type[ast.cmpop], type[ast.cmpop]] = {
 }
 
 
-def refined(frame: Context, test: ast.expr, known: Environment, *, truth: bool) -> Environment | None:
+def refined(frame: Frame, test: ast.expr, known: Environment, *, truth: bool) -> Environment | None:
     """Return the known ranges where a test has the result ``truth``; None where it cannot."""
     if isinstance(test, ast.Constant):
         return known if bool(test.value) is truth else None
@@ -53,8 +57,7 @@ def _truth_of(name: str, known: Environment, *, truth: bool) -> Environment | No
     return known.setting(name, replace(present, low=low, high=high)) if low <= high else None
 
 
-def _all_of(frame: Context, test: ast.BoolOp, known: Environment) -> Environment | None:
-    """Return the known ranges where all operands have the same result: of AND true, of OR false."""
+def _all_of(frame: Frame, test: ast.BoolOp, known: Environment) -> Environment | None:
     truth = isinstance(test.op, ast.And)
     for operand in test.values:
         after = refined(frame, operand, known, truth=truth)
@@ -64,7 +67,7 @@ def _all_of(frame: Context, test: ast.BoolOp, known: Environment) -> Environment
     return known
 
 
-def _one_of(frame: Context, test: ast.BoolOp, known: Environment) -> Environment | None:
+def _one_of(frame: Frame, test: ast.BoolOp, known: Environment) -> Environment | None:
     """Return the known ranges where one operand decided: of AND a false one, of OR a true one."""
     decides = isinstance(test.op, ast.Or)
     found: Environment | None = None
@@ -77,7 +80,7 @@ def _one_of(frame: Context, test: ast.BoolOp, known: Environment) -> Environment
     return found
 
 
-def _compared(frame: Context, test: ast.Compare, known: Environment, *, truth: bool) -> Environment | None:
+def _compared(frame: Frame, test: ast.Compare, known: Environment, *, truth: bool) -> Environment | None:
     operands = [test.left, *test.comparators]
     pairs = list(zip(operands, test.ops, operands[1:], strict=False))
     if len(pairs) > 1 and not truth:
@@ -94,7 +97,7 @@ def _compared(frame: Context, test: ast.Compare, known: Environment, *, truth: b
 
 
 def _bounded(
-    frame: Context, subject: ast.expr, relation: type[ast.cmpop], other: ast.expr, known: Environment, *, truth: bool
+    frame: Frame, subject: ast.expr, relation: type[ast.cmpop], other: ast.expr, known: Environment, *, truth: bool
 ) -> Environment | None:
     """Return the known ranges where ``subject relation other`` is true; the subject may be a name or a negated name.
 
@@ -119,7 +122,6 @@ def _bounded(
 
 
 def _limits(present: Range, relation: type[ast.cmpop], bound: Range) -> tuple[float, float]:
-    """Return the bounds of a value that has a relation to another."""
     low, high = present.low, present.high
     beyond = int(present.is_whole and bound.is_whole)
     if relation is ast.Eq:
@@ -139,7 +141,6 @@ def _limits(present: Range, relation: type[ast.cmpop], bound: Range) -> tuple[fl
 
 
 def _least(present: Range, bound: float) -> float:
-    """Return a lower bound in the kind of a value."""
     if not present.is_whole:
         return float(bound)
     return bound if abs(bound) == INFINITE else math.ceil(bound)

@@ -44,7 +44,6 @@ class Repeated:
     """The translated statements of one function, for reuse; those with loops, or with certain names, are not reused."""
 
     def __init__(self, frame: Frame, never: frozenset[str]) -> None:
-        """Create it for a function; statements with the names ``never`` depend on more than their own names."""
         self._frame, self._never = frame, never
         self._names: dict[int, tuple[str, ...] | None] = {}
         self._came: dict[int, _Came] = {}
@@ -108,7 +107,6 @@ class ScanBody(Body):
     """Translates one scan; ``latched`` are the ranges of the latched values, ``written`` the names of its outputs."""
 
     def __init__(self, frame: Frame, latched: Sequence[Range], written: Sequence[str]) -> None:
-        """Create the translation from the function, its latched values and its outputs."""
         super().__init__(frame)
         self._latched, self._written = latched, written
         self._repeated = Repeated(frame, frozenset({CHANGES}))
@@ -178,7 +176,6 @@ def _kind(item: Range) -> Kind:
 
 
 def _member(value: ast.expr) -> str:
-    """Return the member of ``io`` that an expression calls, "" if none."""
     if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute):
         return value.func.attr
     return ""

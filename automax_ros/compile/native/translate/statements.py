@@ -28,7 +28,6 @@ class Body:
     """Translates the statements of one function."""
 
     def __init__(self, frame: Frame) -> None:
-        """Create the translation of a function."""
         self.frame = frame
         self._loops: list[_Loop] = []
         self._depth = 0

@@ -66,7 +66,10 @@ def translated(compiled: CompiledTask, form: Form) -> NativeSource:
         NotNative: they have a statement that C cannot execute to the same bits.
     """
     with collections_paused():
-        return _Translation(compiled, form).source()
+        translation = _Translation(compiled, form)
+        known = translation.settled()
+        limits = tuple(_limits_of(known[name]) for name in translation.names)
+        return NativeSource(compiled.program.name, translation.text(), limits)
 
 
 def fixed_parts() -> tuple[str, ...]:
@@ -79,8 +82,8 @@ class _Translation:
         self._compiled, self._layout = compiled, compiled.layout
         tuples, self._statements = scan_of(form.function)
         types = {view: type_of_name(name) for name, view in form.views.items()}
-        self._names = state_names(form.function)
-        fields = dict(zip(self._names, self._layout.fields, strict=True))
+        self.names = state_names(form.function)
+        fields = dict(zip(self.names, self._layout.fields, strict=True))
         scalars = {name: field for name, field in fields.items() if not field.is_array}
         self._frame = Frame(
             Unit(),
@@ -103,16 +106,10 @@ class _Translation:
         )
         self._latched = [of_type(type_of_name(name)) for name in compiled.latched]
 
-    def source(self) -> NativeSource:
-        """Return the text and its assumed limits."""
-        known = self._settled()
-        limits = tuple(_limits_of(known[name]) for name in self._names)
-        return NativeSource(self._compiled.program.name, self._text(), limits)
-
-    def _settled(self) -> Environment:
+    def settled(self) -> Environment:
         """Translate until no scan widens the ranges of the state; return these ranges."""
         body = ScanBody(self._frame, self._latched, self._compiled.written)
-        fields = dict(zip(self._names, self._layout.fields, strict=True))
+        fields = dict(zip(self.names, self._layout.fields, strict=True))
         known = Environment({name: _at_first(field) for name, field in fields.items()})
         for _ in range(MOST_ROUNDS):
             self._frame.begin_again()
@@ -138,7 +135,7 @@ class _Translation:
             raise NotNative(f"{field.name} may be left with a value beyond its type")
         return self._frame.pinned(name, known)
 
-    def _text(self) -> str:
+    def text(self) -> str:
         frame = self._frame
         declared = [f"    {kind} {place};" for place, kind in frame.locals.items()]
         *before, after = fixed_parts()
@@ -146,7 +143,7 @@ class _Translation:
             [
                 *before,
                 f"/* The state of {self._compiled.program.name}, as its layout has it. */",
-                *_structure(self._names, self._layout),
+                *_structure(self.names, self._layout),
                 "",
                 f"#define AUTOMAX_LATCHED {len(self._latched)}",
                 f"#define AUTOMAX_WRITTEN {len(self._compiled.written)}",
@@ -189,7 +186,6 @@ def _limits_of(known: Range) -> tuple[int, int]:
 
 @cache
 def _part(name: str) -> str:
-    """Return a C text that is the same for all tasks."""
     return files("automax_ros.compile.native").joinpath(name).read_text(encoding="utf-8")
 
 
