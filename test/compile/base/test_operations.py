@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import linecache
 import math
 import shutil
+from types import SimpleNamespace
 
 import pytest
 
@@ -33,136 +35,51 @@ from compile.native.operations import (
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
 
 
-def sum_of(a, b):
-    return a + b
-
-
-def difference_of(a, b):
-    return a - b
-
-
-def product(a, b):
-    return a * b
-
-
-def quotient(a, b):
-    return a / b
-
-
-def quotient_below(a, b):
-    return a // b
-
-
-def rest_of(a, b):
-    return a % b
-
-
-def negative(a):
-    return -a
-
-
-def inverted(a):
-    return ~a
-
-
-def both_bits(a, b):
-    return a & b
-
-
-def any_bits(a, b):
-    return a | b
-
-
-def other_bits(a, b):
-    return a ^ b
-
-
-def shifted_left(a, b):
-    return a << b
-
-
-def shifted_right(a, b):
-    return a >> b
-
-
-def less(a, b):
-    return a < b
-
-
-def at_most(a, b):
-    return a <= b
-
-
-def equal(a, b):
-    return a == b
-
-
-def unequal(a, b):
-    return a != b
-
-
-def between(a, b, c):
-    return a < b <= c
-
-
-def least(a, b):
-    return min(a, b)
-
-
-def most(a, b):
-    return max(a, b)
-
-
-def magnitude(a):
-    return abs(a)
-
-
-def without_fraction(a):
-    return int(a)
-
-
-def rounded_down(a):
-    return math.floor(a)
-
-
-def as_float(a):
-    return float(a)
-
-
-def truth(a):
-    return bool(a)
-
-
-def chosen(a, b, c):
-    return a if c else b
-
-
-def is_nan(a):
-    return math.isnan(a)
-
-
-def is_finite(a):
-    return math.isfinite(a)
-
-
-def root(a):
-    return math.sqrt(a)
-
-
-def log_of(a):
-    return math.log(a)
-
-
-def power_of_e(a):
-    return math.exp(a)
-
-
-def squared(a):
-    return raised(a, 2.0)
-
-
-def cubed(a):
-    return raised(a, 3.0)
+FORMULAS = {
+    "sum_of": ("a, b", "a + b"),
+    "difference_of": ("a, b", "a - b"),
+    "product": ("a, b", "a * b"),
+    "quotient": ("a, b", "a / b"),
+    "quotient_below": ("a, b", "a // b"),
+    "rest_of": ("a, b", "a % b"),
+    "negative": ("a", "-a"),
+    "inverted": ("a", "~a"),
+    "both_bits": ("a, b", "a & b"),
+    "any_bits": ("a, b", "a | b"),
+    "other_bits": ("a, b", "a ^ b"),
+    "shifted_left": ("a, b", "a << b"),
+    "shifted_right": ("a, b", "a >> b"),
+    "less": ("a, b", "a < b"),
+    "at_most": ("a, b", "a <= b"),
+    "equal": ("a, b", "a == b"),
+    "unequal": ("a, b", "a != b"),
+    "between": ("a, b, c", "a < b <= c"),
+    "least": ("a, b", "min(a, b)"),
+    "most": ("a, b", "max(a, b)"),
+    "magnitude": ("a", "abs(a)"),
+    "without_fraction": ("a", "int(a)"),
+    "rounded_down": ("a", "math.floor(a)"),
+    "as_float": ("a", "float(a)"),
+    "truth": ("a", "bool(a)"),
+    "chosen": ("a, b, c", "a if c else b"),
+    "is_nan": ("a", "math.isnan(a)"),
+    "is_finite": ("a", "math.isfinite(a)"),
+    "squared": ("a", "raised(a, 2.0)"),
+    "cubed": ("a", "raised(a, 3.0)"),
+}
+"""Name, parameters and result of functions of one expression."""
+
+
+def of_formulas() -> SimpleNamespace:
+    """The functions, with a source from which they can be translated."""
+    place, known = "<formulas>", {"math": math, "raised": raised}
+    text = "".join(f"def {name}({given}):\n    return {result}\n" for name, (given, result) in FORMULAS.items())
+    linecache.cache[place] = (len(text), None, text.splitlines(keepends=True), place)
+    exec(compile(text, place, "exec"), known)
+    return SimpleNamespace(**{name: known[name] for name in FORMULAS})
+
+
+of = of_formulas()
 
 
 def clamped_sum(a, b):
@@ -183,14 +100,18 @@ IN_53_BITS = real(-(2.0**52), 2.0**52)
 TWO = [
     *(
         Operation(function, (kind, kind))
-        for function in (sum_of, difference_of, product)
+        for function in (of.sum_of, of.difference_of, of.product)
         for kind in (WORD, LONG, BIG, ANY, FLAG)
     ),
-    *(Operation(function, pair) for function in (sum_of, product, quotient) for pair in ((LONG, ANY), (ANY, EXACT))),
-    *(Operation(quotient, pair) for pair in ((WORD, WORD), (LONG, LONG), (EXACT, EXACT), (ANY, ANY), (FLAG, WORD))),
     *(
         Operation(function, pair)
-        for function in (quotient_below, rest_of)
+        for function in (of.sum_of, of.product, of.quotient)
+        for pair in ((LONG, ANY), (ANY, EXACT))
+    ),
+    *(Operation(of.quotient, pair) for pair in ((WORD, WORD), (LONG, LONG), (EXACT, EXACT), (ANY, ANY), (FLAG, WORD))),
+    *(
+        Operation(function, pair)
+        for function in (of.quotient_below, of.rest_of)
         for pair in (
             (WORD, WORD),
             (LONG, LONG),
@@ -205,19 +126,19 @@ TWO = [
     ),
     *(
         Operation(function, pair)
-        for function in (both_bits, any_bits, other_bits)
+        for function in (of.both_bits, of.any_bits, of.other_bits)
         for pair in ((WORD, WORD), (LONG, WORD), (BIG, BIG), (BITS, LONG), (FLAG, FLAG), (FLAG, LONG))
     ),
-    *(Operation(shifted_left, pair) for pair in ((WORD, COUNT), (LONG, whole(0, 31)), (HALF, whole(0, 40)))),
-    *(Operation(shifted_right, pair) for pair in ((WORD, COUNT), (LONG, whole(0, 31)), (BIG, whole(0, 62)))),
+    *(Operation(of.shifted_left, pair) for pair in ((WORD, COUNT), (LONG, whole(0, 31)), (HALF, whole(0, 40)))),
+    *(Operation(of.shifted_right, pair) for pair in ((WORD, COUNT), (LONG, whole(0, 31)), (BIG, whole(0, 62)))),
     *(
         Operation(function, pair)
-        for function in (less, at_most, equal, unequal, least, most)
+        for function in (of.less, of.at_most, of.equal, of.unequal, of.least, of.most)
         for pair in ((LONG, LONG), (BIG, BIG), (ANY, ANY), (FLAG, FLAG))
     ),
     *(
         Operation(function, pair)
-        for function in (less, at_most, equal, unequal)
+        for function in (of.less, of.at_most, of.equal, of.unequal)
         for pair in ((LONG, ANY), (ANY, EXACT), (EXACT, ANY), (FLAG, ANY), (BIG, IN_53_BITS), (IN_53_BITS, BIG))
     ),
     Operation(clamped_sum, (WORD, WORD)),
@@ -239,20 +160,20 @@ TWO = [
     Operation(functions.rotate_right, (LONG, SMALL)),
 ]
 ONE = [
-    *(Operation(negative, (kind,)) for kind in (WORD, LONG, BIG, ANY, FLAG)),
-    *(Operation(inverted, (kind,)) for kind in (WORD, LONG, HALF)),
-    *(Operation(magnitude, (kind,)) for kind in (WORD, LONG, BIG, ANY, FLAG)),
-    *(Operation(as_float, (kind,)) for kind in (FLAG, LONG, BIG, ANY)),
-    *(Operation(truth, (kind,)) for kind in (FLAG, LONG, BIG, ANY)),
+    *(Operation(of.negative, (kind,)) for kind in (WORD, LONG, BIG, ANY, FLAG)),
+    *(Operation(of.inverted, (kind,)) for kind in (WORD, LONG, HALF)),
+    *(Operation(of.magnitude, (kind,)) for kind in (WORD, LONG, BIG, ANY, FLAG)),
+    *(Operation(of.as_float, (kind,)) for kind in (FLAG, LONG, BIG, ANY)),
+    *(Operation(of.truth, (kind,)) for kind in (FLAG, LONG, BIG, ANY)),
     *(
         Operation(function, (kind,))
-        for function in (without_fraction, rounded_down)
+        for function in (of.without_fraction, of.rounded_down)
         for kind in (LONG, real(-4e18, 4e18), real(-1e30, 1e30), real(-(2.0**125), 2.0**125))
     ),
-    *(Operation(function, (ANY,)) for function in (is_nan, is_finite)),
+    *(Operation(function, (ANY,)) for function in (of.is_nan, of.is_finite)),
     *(Operation(function, (ANY,)) for function in (stored_real, functions.store_real)),
-    *(Operation(function, (REAL_OF_RACK,)) for function in (squared, cubed)),
-    *(Operation(function, (ANY,)) for function in (squared, cubed)),
+    *(Operation(function, (REAL_OF_RACK,)) for function in (of.squared, of.cubed)),
+    *(Operation(function, (ANY,)) for function in (of.squared, of.cubed)),
     *(
         Operation(function, (ANY,))
         for function in (
@@ -265,10 +186,10 @@ ONE = [
     Operation(numbers.clamp32, (BIG,)),
 ]  # fmt: skip
 THREE = [
-    Operation(between, (WORD, ANY, LONG)),
-    Operation(between, (LONG, LONG, LONG)),
-    Operation(chosen, (ANY, ANY, FLAG)),
-    Operation(chosen, (LONG, WORD, FLAG)),
+    Operation(of.between, (WORD, ANY, LONG)),
+    Operation(of.between, (LONG, LONG, LONG)),
+    Operation(of.chosen, (ANY, ANY, FLAG)),
+    Operation(of.chosen, (LONG, WORD, FLAG)),
 ]
 
 
@@ -296,12 +217,12 @@ def test_operations_give_python_s_bits_for_many_values(built, seed) -> None:
 @pytest.mark.parametrize(
     "operation",
     [
-        Operation(quotient, (BIG, BIG)),
-        Operation(less, (BIG, ANY)),
-        Operation(equal, (ANY, BIG)),
-        Operation(least, (ANY, BIG)),
-        Operation(shifted_left, (LONG, LONG)),
-        Operation(shifted_right, (LONG, whole(-1, 3))),
+        Operation(of.quotient, (BIG, BIG)),
+        Operation(of.less, (BIG, ANY)),
+        Operation(of.equal, (ANY, BIG)),
+        Operation(of.least, (ANY, BIG)),
+        Operation(of.shifted_left, (LONG, LONG)),
+        Operation(of.shifted_right, (LONG, whole(-1, 3))),
     ],
     ids=lambda operation: operation.name,
 )
@@ -313,7 +234,7 @@ def test_what_c_would_do_otherwise_is_not_native(operation) -> None:
 def test_a_wrong_operation_would_be_found(built) -> None:
     """What C gives for one operation is not what Python gives for its neighbour."""
     kinds = (real(-4e18, 4e18),)
-    down, toward_zero = Operation(rounded_down, kinds), Operation(without_fraction, kinds)
+    down, toward_zero = Operation(of.rounded_down, kinds), Operation(of.without_fraction, kinds)
     both = Built([down], NativeCache(built.folder))
     both.translated[toward_zero] = both.translated[down]
     assert first_difference(down, both, [(-0.5,), (0.5,)]) == ""

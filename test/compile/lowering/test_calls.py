@@ -77,18 +77,14 @@ class FakeIo:
         return self.outcomes.pop(0)
 
 
-def at_once(compiled, io, state, scans=1):
-    running = compiled.scans(state, io)
-    ended = [next(running) for _ in range(scans)]
-    running.close()
-    return ended[-1]
+def whole(form):
+    def execute(compiled, io, state, scans=1):
+        running = getattr(compiled, form)(state, io)
+        ended = [next(running) for _ in range(scans)]
+        running.close()
+        return ended[-1]
 
-
-def forced_form(compiled, io, state, scans=1):
-    running = compiled.scans_forced(state, io)
-    ended = [next(running) for _ in range(scans)]
-    running.close()
-    return ended[-1]
+    return execute
 
 
 def stepped(form):
@@ -106,8 +102,8 @@ def stepped(form):
 
 
 FORMS = {
-    "scans": at_once,
-    "scans_forced": forced_form,
+    "scans": whole("scans"),
+    "scans_forced": whole("scans_forced"),
     "scan_steps": stepped(lambda compiled: compiled.scan_steps),
     "scan_steps_forced": stepped(lambda compiled: compiled.scan_steps_forced),
     "scan_lines": stepped(lambda compiled: compiled.scan_lines.scan),
@@ -243,7 +239,7 @@ def test_a_task_with_nothing_but_its_call():
     compiled = compiled_of(text)
     io = FakeIo(results())
     io.latched = {}
-    at_once(compiled, io, compiled.layout.fresh())
+    FORMS["scans"](compiled, io, compiled.layout.fresh())
     assert io.done == [("latch",), ("loop",)]
 
 
