@@ -22,7 +22,6 @@ class RackStopped(Event):  # type: ignore[misc]
     name = "automax_ros.RackStopped"
 
     def __init__(self, text: str) -> None:
-        """Store the line that the rack printed."""
         self.text = text
 
     @staticmethod

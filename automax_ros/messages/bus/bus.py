@@ -10,7 +10,8 @@ all later writes for ever (decision: limits as below).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S
@@ -41,7 +42,6 @@ class BusLimits:
     """Checks messages. ``seats`` are the slots of all processes of the rack, by the slot that names each."""
 
     def __init__(self, seats: Mapping[int, tuple[int, ...]]) -> None:
-        """Store the processes of the rack."""
         self._seats = {seat: tuple(sorted(slots)) for seat, slots in seats.items()}
         self._slots = {0}.union(*seats.values())  # 0 is that of values as installed
 
@@ -81,13 +81,10 @@ class BusLimits:
         times = (*message.since_ns, *message.force_since_ns)
         if not all(INSTALLED_NS <= time_ns <= latest_ns for time_ns in times):
             return "an image with a time that cannot be"
-        if not self._are_seats((*message.seat, *message.force_seat)):
+        if not self._slots.issuperset((*message.seat, *message.force_seat)):
             return "an image with a slot that is none of the rack"
         most = max((message.sequence, *message.order, *message.force_order))
         return "an image with a number that none has" if most > LARGEST_SEQUENCE else ""
-
-    def _are_seats(self, seats: Iterable[int]) -> bool:
-        return self._slots.issuperset(seats)
 
 
 def write_message(batch: Batch, run_id: int, process: int) -> BusWrite:
@@ -112,26 +109,11 @@ def batch_of(message: BusWrite, texts: Collection[int]) -> Batch:
 
 def image_message(picture: ImageCopy, now_ns: int, run_id: int, process: int, asked_by: int) -> BusImage:
     """Return the image of a process as a message for the process that requested it."""
-    values, forces = picture.values, picture.forces
-    return BusImage(
-        now_ns,
-        run_id,
-        process,
-        picture.sequence,
-        asked_by,
-        values_of([(held.view, held.element, held.value) for held in values]),
-        [held.mask for held in values],
-        [held.version[0] for held in values],
-        [held.version[1] for held in values],
-        [held.version[2] for held in values],
-        [force.view for force in forces],
-        [force.element for force in forces],
-        [float(force.value) for force in forces],
-        [force.held for force in forces],
-        [force.version[0] for force in forces],
-        [force.version[1] for force in forces],
-        [force.version[2] for force in forces],
-    )
+    values = [(item.view, item.element, item.value) for item in picture.values]
+    versions = [(item.mask, *item.version) for item in picture.values]
+    forces = [(item.view, item.element, float(item.value), item.held, *item.version) for item in picture.forces]
+    columns = (*_columns(versions, 4), *_columns(forces, 7))
+    return BusImage(now_ns, run_id, process, picture.sequence, asked_by, values_of(values), *columns)
 
 
 def picture_of(message: BusImage, texts: Collection[int]) -> ImageCopy:
@@ -174,6 +156,10 @@ def with_standing(presence: Presence, standing: StopState) -> Presence:
         stopped_task=cause.task if cause else "",
         stopped_reason=cause.reason[:500] if cause else "",
     )
+
+
+def _columns(rows: Sequence[tuple[Any, ...]], number: int) -> Iterator[list[Any]]:
+    return ([row[place] for row in rows] for place in range(number))
 
 
 def _entries(values: Values, texts: Collection[int]) -> Iterator[tuple[int, int, Value]]:

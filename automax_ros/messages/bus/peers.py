@@ -104,29 +104,26 @@ class Peers:
         if presence.epoch_ns and not self.epoch_ns:
             self.epoch_ns = presence.epoch_ns
         peer = self.by_seat.get(presence.seat)
-        if peer is None or peer.process != presence.process:
-            # Batches from before its first presence were not received: the first one that it announces is missing.
-            self.by_seat[presence.seat] = peer = Peer(presence, now_ns)
-            self.lost.discard(presence.seat)
-            found = PresenceVerdict.NEW
-        else:
-            peer.presence, peer.heard_ns, found = presence, now_ns, PresenceVerdict.KNOWN
-        return found
+        if peer is not None and peer.process == presence.process:
+            peer.presence, peer.heard_ns = presence, now_ns
+            return PresenceVerdict.KNOWN
+        # Batches from before its first presence were not received: the first one that it announces is missing.
+        self.by_seat[presence.seat] = Peer(presence, now_ns)
+        self.lost.discard(presence.seat)
+        return PresenceVerdict.NEW
 
     def is_short(self, presence: Presence) -> bool:
         """Whether a presence, if it is an accepted one and the latest, announces batches that were not received."""
-        return self._told(presence) is not None
+        return self._short(presence) is not None
 
     def missed(self, presence: Presence, now_ns: int) -> None:
         """Note that batches announced by a presence are missing, though all that arrived was read since."""
-        peer = self._told(presence)
-        if peer is None:
-            return
-        if peer.short_since_ns is None:
-            peer.short_since_ns = now_ns
-        peer.gap = peer.gap or now_ns - peer.short_since_ns >= MISSING_NS
+        peer = self._short(presence)
+        if peer is not None:
+            peer.short_since_ns = now_ns if peer.short_since_ns is None else peer.short_since_ns
+            peer.gap = peer.gap or now_ns - peer.short_since_ns >= MISSING_NS
 
-    def _told(self, presence: Presence) -> Peer | None:
+    def _short(self, presence: Presence) -> Peer | None:
         """Return the process whose latest presence this is, if it announces batches that were not received."""
         peer = self.by_seat.get(presence.seat)
         return peer if peer is not None and peer.presence is presence and presence.sequence > peer.received else None

@@ -23,8 +23,6 @@ from automax_ros.messages.cdr.parts import (
     COUNT,
     HEADER,
     CdrError,
-    SequencePackings,
-    WholePackings,
     number_layouts,
     put_count,
     put_text,
@@ -34,8 +32,10 @@ from automax_ros.messages.cdr.parts import (
     read_numbers,
     read_text,
     read_texts,
+    sequence_packings,
     size_of,
     together,
+    whole_packings,
 )
 from automax_ros.messages.types.definitions import TIME, Field, message_types
 from automax_ros.messages.types.messages import CLASSES, NAMES, NO_VALUES, Values
@@ -77,17 +77,14 @@ class _Source:
         self.indent = 1
 
     def add(self, *lines: str) -> None:
-        """Add lines at the present depth."""
         self._lines += [" " * (4 * self.indent) + line for line in lines]
 
     def name(self, stem: str, value: object) -> str:
-        """Return a name by which the lines can refer to an object."""
         name = f"{stem}{len(self._objects)}"
         self._objects[name] = value
         return name
 
     def made(self) -> Any:
-        """Return the function."""
         exec(compile("\n".join(self._lines), f"<CDR of {self._objects['TYPE']}>", "exec"), self._objects)
         return self._objects[self._signature.partition("(")[0]]
 
@@ -99,7 +96,14 @@ def encoder(type_name: str) -> Encode:
     It also accepts a plain tuple of all fields instead of an instance. It raises CdrError if a value does not fit.
     """
     source = _Source("encode(message)", type_name)
-    general = source.name("general", _general_encoder(type_name))
+    append = _appender(type_name)
+
+    def encode_in_parts(message: Any) -> bytes:
+        out = bytearray(HEADER)
+        append(message, out)
+        return bytes(out)
+
+    general = source.name("general", encode_in_parts)
     source.add("try:")
     source.indent += 1
     packing = _WholePacking(source, f"return {general}(message)")
@@ -179,7 +183,6 @@ def _variables(fields: Sequence[Field], prefix: str = "") -> str:
 
 
 def _arguments(fields: Sequence[Field], prefix: str = "") -> str:
-    """Return numbers as arguments of a packing."""
     return ", ".join(
         f"*divmod({prefix}{field.name}_, SECOND)" if field.kind == TIME else f"{prefix}{field.name}_"
         for field in fields
@@ -195,20 +198,8 @@ def _empty(type_name: str) -> Any:
     return CLASSES[type_name](*[()] * len(fields)) if all(field.array for field in fields) else None
 
 
-def _general_encoder(type_name: str) -> Encode:
-    append = _appender(type_name)
-
-    def encode_in_parts(message: Any) -> bytes:
-        out = bytearray(HEADER)
-        append(message, out)
-        return bytes(out)
-
-    return encode_in_parts
-
-
 @functools.cache
 def _appender(type_name: str) -> _Append:
-    """Return the function that appends a message of the type to bytes, part by part."""
     source = _Source("append(message, out)", type_name)
     fields = _fields(type_name)
     if _empty(type_name) is not None:
@@ -222,7 +213,7 @@ def _appender(type_name: str) -> _Append:
             layouts = source.name("layouts", number_layouts(_codes(members)))
             source.add(f"out += {layouts}[len(out) & 7].pack({_arguments(members)})")
         elif group == "sequences":
-            packings = source.name("packings", SequencePackings(_codes(members)))
+            packings = source.name("packings", sequence_packings(_codes(members)))
             counts = ", ".join(f"len({field.name}_)" for field in members)
             items = ", ".join(f"len({field.name}_), *{field.name}_" for field in members)
             source.add(f"out += {packings}[len(out) & 7, {counts}]({items})")
@@ -247,7 +238,6 @@ class _WholePacking:
         self._arguments = ["HEADER"]
 
     def add_message(self, type_name: str, prefix: str, message: str) -> None:
-        """Add a message; its fields become variables with the prefix ``prefix``."""
         fields = _fields(type_name)
         empty = _empty(type_name)
         if empty is not None and prefix:
@@ -291,8 +281,7 @@ class _WholePacking:
         self._arguments += [f"{count}, *{value}" for value in values]
 
     def finish(self) -> None:
-        """Add the call."""
-        packings = WholePackings(self._plan)
+        packings = whole_packings(self._plan)
         if self._sizes:
             pack = f"{self._source.name('packings', packings)}[{''.join(f'{size}, ' for size in self._sizes)}]"
         else:
@@ -302,7 +291,6 @@ class _WholePacking:
 
 @functools.cache
 def _smallest_size(type_name: str) -> int:
-    """Return the least number of bytes of a message of the type inside another."""
     total = 0
     for field in _fields(type_name):
         if field.array or field.kind == "string":
@@ -316,7 +304,6 @@ def _smallest_size(type_name: str) -> int:
 
 @functools.cache
 def _reader(type_name: str) -> _Read:
-    """Return the function that reads a message inside another; it returns the position after it too."""
     source = _Source("read(data, position)", type_name)
     fields = _fields(type_name)
     empty = _empty(type_name)
@@ -334,7 +321,6 @@ def _reader(type_name: str) -> _Read:
 
 
 def _add_entry(source: _Source, fields: Sequence[Field], text_reader: str) -> None:
-    """Add lines that check the header, read the fields and raise CdrError for malformed bytes."""
     source.add(
         "if data[:4] != HEADER:",
         "    begins = f'starts with {data[:4].hex(chr(32))}, not with 00 01 00 00 (little-endian CDR)'",
@@ -349,7 +335,6 @@ def _add_entry(source: _Source, fields: Sequence[Field], text_reader: str) -> No
 
 
 def _add_reading(source: _Source, fields: Sequence[Field], text_reader: str) -> None:
-    """Add lines that store each field in its variable and advance the position."""
     for group, members in _groups(fields):
         field = members[0]
         target = f"{field.name}_, position"

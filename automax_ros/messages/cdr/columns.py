@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.cdr.cdr import MAX_TRAILING
 from automax_ros.messages.cdr.parts import CODES, HEADER, size_of
-from automax_ros.messages.types.definitions import TIME, Field, message_types
+from automax_ros.messages.types.definitions import TIME, message_types
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -58,21 +58,17 @@ class _Matrix:
         return int(self.bytes.shape[1])
 
     def aligned(self, size: int) -> int:
-        """Return the position of the next number of a size."""
         return self.position + (len(HEADER) - self.position) % size
 
     def column(self, position: int, kind: np.dtype[Any], count: int = 1) -> Array | None:
-        """Return the numbers from a position on; None if the messages end before."""
         end = position + kind.itemsize * count
         return self.bytes[:, position:end].view(kind) if end <= self.length else None
 
     def then(self, position: int, name: str = "", field: Array | None = None) -> _Matrix:
-        """Return the matrix read up to a later position, with one more field."""
         fields = self.fields if field is None else {**self.fields, name: field}
         return _Matrix(self.rows, self.bytes, position, fields)
 
     def only(self, chosen: Array) -> _Matrix:
-        """Return some of the messages."""
         fields = {name: field[chosen] for name, field in self.fields.items()}
         return _Matrix(self.rows[chosen], self.bytes[chosen], self.position, fields)
 
@@ -115,14 +111,12 @@ def decode_columns(type_name: str, data: Bytes, starts: Ints, lengths: Ints) -> 
 
 
 def _alike(keys: Array) -> Iterator[Ints]:
-    """Yield the numbers of the items with the same key, ascending."""
     order = np.argsort(keys, kind="stable")
     ordered = keys[order]
     yield from (part for part in np.split(order, np.flatnonzero(ordered[1:] != ordered[:-1]) + 1) if len(part))
 
 
 def _gathered(data: Bytes, starts: Ints, length: int) -> Bytes:
-    """Return the messages of one length as the rows of a matrix."""
     places = np.ndarray((len(data) - length + 1,), dtype=f"V{length}", buffer=data, strides=(1,))
     found: Bytes = places[starts].view(_BYTE).reshape(len(starts), length)
     return found
@@ -138,27 +132,23 @@ def _read_all(matrix: _Matrix, readers: Sequence[_Read]) -> Iterator[_Matrix]:
 
 @functools.cache
 def _readers(type_name: str) -> tuple[_Read, ...]:
-    """Return the functions that read the fields of a type one after the other."""
     return (_read_header, *_field_readers(type_name, ""))
 
 
 def _field_readers(type_name: str, prefix: str) -> Iterator[_Read]:
     for field in message_types()[type_name].definition.fields:
-        yield from _readers_of(field, prefix + field.name)
-
-
-def _readers_of(field: Field, name: str) -> Iterator[_Read]:
-    if field.kind == TIME:
-        yield functools.partial(_read_time, name)
-    elif field.kind in CODES:
-        kind = np.dtype("u1" if field.kind == "bool" else f"<{CODES[field.kind]}")
-        yield functools.partial(_read_numbers if field.array else _read_number, name, kind)
-    elif field.kind == "string":
-        yield _read_no_texts if field.array else functools.partial(_read_text, name)
-    elif field.array:
-        yield functools.partial(_read_items, name, _members(field.kind))
-    else:
-        yield from _field_readers(field.kind, f"{name}.")
+        name = prefix + field.name
+        if field.kind == TIME:
+            yield functools.partial(_read_time, name)
+        elif field.kind in CODES:
+            kind = np.dtype("u1" if field.kind == "bool" else f"<{CODES[field.kind]}")
+            yield functools.partial(_read_numbers if field.array else _read_number, name, kind)
+        elif field.kind == "string":
+            yield _read_no_texts if field.array else functools.partial(_read_text, name)
+        elif field.array:
+            yield functools.partial(_read_items, name, _members(field.kind))
+        else:
+            yield from _field_readers(field.kind, f"{name}.")
 
 
 @functools.cache
@@ -218,9 +208,7 @@ def _read_numbers(name: str, kind: np.dtype[Any], matrix: _Matrix) -> Iterator[_
 
 def _read_items(name: str, members: tuple[tuple[str, str], ...], matrix: _Matrix) -> Iterator[_Matrix]:
     for count, following in matrix.by_count():
-        if count > MOST_ITEMS:
-            continue
-        made = _items(name, members, count, following)
+        made = None if count > MOST_ITEMS else _items(name, members, count, following)
         if made is not None:
             yield made
 
@@ -243,7 +231,6 @@ def _items(name: str, members: tuple[tuple[str, str], ...], count: int, matrix: 
 
 
 def _fitting(matrix: _Matrix, fits: Array) -> Iterator[_Matrix]:
-    """Yield the matrix of those messages that fit, if there are any."""
     if fits.all():
         yield matrix
     elif fits.any():

@@ -55,7 +55,8 @@ def _lines(type_name: str, prefix: str, numbers: list[str], lists: list[str]) ->
         elif field.kind == "string" and field.array:
             yield "    TEXTS()"
         elif field.array or field.kind == "string":
-            yield f"    {_list(field)}({len(lists)}, {_item_bytes(field)})"
+            macro = "TEXT" if field.kind == "string" else "LIST"
+            yield f"    {macro}({len(lists)}, {_item_bytes(field)})"
             lists.append(name)
         else:
             yield f"    {_number(field)} /* {name} */".replace("#", str(len(numbers)))
@@ -71,12 +72,7 @@ def _number(field: Field) -> str:
     return f"NUMBER(#, {_TYPES[code]})"
 
 
-def _list(field: Field) -> str:
-    return "TEXT" if field.kind == "string" else "LIST"
-
-
 def _item_bytes(field: Field) -> str:
-    """Return the alignment of an item, and its size in bytes."""
     if field.kind == "string":
         return "1, 1"
     if field.kind in CODES:

@@ -5,10 +5,13 @@ A recorder of a live rack needs these fields to sort a message in, and stores it
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
 
 from automax_ros.messages.cdr.cdr import decode, head_reader
 from automax_ros.messages.types.messages import JointState, PlantState, VariableTable
+
+_Head = TypeVar("_Head", bound="tuple[object, ...]")
 
 
 class WriteHead(NamedTuple):
@@ -65,51 +68,20 @@ def plant_stamp(type_name: str, payload: bytes) -> int:
     return message.stamp if isinstance(message, PlantState) else message.header.stamp
 
 
-def state_head(payload: bytes) -> StateHead:
-    """Return the head of a TaskState.
+def _head_of(name: str, head: type[_Head]) -> Callable[[bytes], _Head]:
+    """Return a function that reads the head of a message; it raises CdrError if the bytes are not one."""
 
-    Raises:
-        CdrError: the bytes are not one, or the task's name is not short ASCII text.
-    """
-    head: StateHead = head_reader("automax_msgs/msg/TaskState", StateHead)(payload)
-    return head
+    def read(payload: bytes) -> _Head:
+        found: _Head = head_reader(f"automax_msgs/msg/{name}", head)(payload)
+        return found
 
-
-def operation_head(payload: bytes) -> OperationHead:
-    """Return the head of an Operation.
-
-    Raises:
-        CdrError: the bytes are not one.
-    """
-    head: OperationHead = head_reader("automax_msgs/msg/Operation", OperationHead)(payload)
-    return head
+    return read
 
 
-def write_head(payload: bytes) -> WriteHead:
-    """Return the head of a CommonWrite.
-
-    Raises:
-        CdrError: the bytes are not one.
-    """
-    head: WriteHead = head_reader("automax_msgs/msg/CommonWrite", WriteHead)(payload)
-    return head
-
-
-def image_head(payload: bytes) -> WriteHead:
-    """Return the head of a CommonImage.
-
-    Raises:
-        CdrError: the bytes are not one.
-    """
-    head: WriteHead = head_reader("automax_msgs/msg/CommonImage", WriteHead)(payload)
-    return head
-
-
-def scan_head(payload: bytes) -> ScanHead:
-    """Return the head of a Scan.
-
-    Raises:
-        CdrError: the bytes are not one, or the task's name is not short ASCII text.
-    """
-    head: ScanHead = head_reader("automax_msgs/msg/Scan", ScanHead)(payload)
-    return head
+state_head = _head_of("TaskState", StateHead)
+operation_head = _head_of("Operation", OperationHead)
+write_head = _head_of("CommonWrite", WriteHead)
+image_head = _head_of("CommonImage", WriteHead)
+scan_head = _head_of("Scan", ScanHead)
+"""These return the head of a message; they raise CdrError if the bytes are not one, or a task's name in it is not short
+ASCII text."""

@@ -93,21 +93,30 @@ def number_layouts(codes: str) -> tuple[struct.Struct, ...]:
     return tuple(layouts)
 
 
-class WholePackings(dict[tuple[int, ...], Callable[..., bytes]]):
-    """Functions that pack a whole message at once, header included, by the sizes of its texts and sequences.
+class Packings(dict[tuple[int, ...], Callable[..., bytes]]):
+    """Functions that pack numbers and texts, by their sizes; ``layout_of`` returns the format for the sizes."""
+
+    def __init__(self, layout_of: Callable[[tuple[int, ...]], str]) -> None:
+        super().__init__()
+        self._layout_of = layout_of
+
+    def __missing__(self, sizes: tuple[int, ...]) -> Callable[..., bytes]:
+        if len(self) >= MOST_LAYOUTS:
+            self.clear()
+        self[sizes] = pack = struct.Struct(f"<{self._layout_of(sizes)}").pack
+        return pack
+
+
+def whole_packings(plan: Sequence[tuple[str, str]]) -> Packings:
+    """Return the packings of a whole message, header included, by the sizes of its texts and sequences.
 
     ``plan`` has a part for each size: ``text``, or the codes of sequences that have the same length; and between them
     the codes of single numbers.
     """
 
-    def __init__(self, plan: Sequence[tuple[str, str]]) -> None:
-        super().__init__()
-        self._plan = tuple(plan)
-
-    def __missing__(self, sizes: tuple[int, ...]) -> Callable[..., bytes]:
-        """Build and keep the packing of messages with these sizes."""
+    def layout_of(sizes: tuple[int, ...]) -> str:
         layout, following = Layout(len(HEADER)), iter(sizes)
-        for word, codes in self._plan:
+        for word, codes in plan:
             size = 0 if word == "numbers" else next(following)
             if word == "text":
                 layout.add_text(size)
@@ -116,28 +125,21 @@ class WholePackings(dict[tuple[int, ...], Callable[..., bytes]]):
                     layout.add(code)
                 else:
                     layout.add_sequence(code, size)
-        if len(self) >= MOST_LAYOUTS:
-            self.clear()
-        self[sizes] = pack = struct.Struct(f"<{len(HEADER)}s{layout.text}").pack
-        return pack
+        return f"{len(HEADER)}s{layout.text}"
+
+    return Packings(layout_of)
 
 
-class SequencePackings(dict[tuple[int, ...], Callable[..., bytes]]):
-    """Functions that pack neighbouring sequences of numbers, by the position modulo 8 and the length of each."""
+def sequence_packings(codes: str) -> Packings:
+    """Return the packings of neighbouring sequences of numbers, by the position modulo 8 and the length of each."""
 
-    def __init__(self, codes: str) -> None:
-        super().__init__()
-        self._codes = codes
-
-    def __missing__(self, place: tuple[int, ...]) -> Callable[..., bytes]:
-        """Build and keep the packing of sequences at this position with these lengths."""
+    def layout_of(place: tuple[int, ...]) -> str:
         layout = Layout(place[0])
-        for code, count in zip(self._codes, place[1:], strict=True):
+        for code, count in zip(codes, place[1:], strict=True):
             layout.add_sequence(code, count)
-        if len(self) >= MOST_LAYOUTS:
-            self.clear()
-        self[place] = pack = layout.packing().pack
-        return pack
+        return layout.text
+
+    return Packings(layout_of)
 
 
 def put_count(out: bytearray, count: int) -> None:
@@ -158,17 +160,13 @@ def put_texts(out: bytearray, values: Sequence[str]) -> None:
         put_text(out, value)
 
 
-def _too_long(count: int, rest: int) -> CdrError:
-    return CdrError(f"a sequence of {count} items in the last {rest} bytes")
-
-
 def read_count(data: bytes, position: int, smallest: int) -> tuple[int, int]:
     """Read the length of a sequence with items of at least ``smallest`` bytes each; refuse one that does not fit."""
     position += -position & 3
     (count,) = COUNT.unpack_from(data, position)
     position += 4
     if count * smallest > len(data) - position:
-        raise _too_long(count, len(data) - position)
+        raise CdrError(f"a sequence of {count} items in the last {len(data) - position} bytes")
     return count, position
 
 
@@ -178,7 +176,7 @@ def read_text(data: bytes, position: int) -> tuple[str, int]:
     (length,) = COUNT.unpack_from(data, start - COUNT.size)
     end = start + length
     if end > len(data):
-        raise _too_long(length, len(data) - start)
+        raise CdrError(f"a sequence of {length} items in the last {len(data) - start} bytes")
     if not length:
         return "", end
     if data[end - 1]:

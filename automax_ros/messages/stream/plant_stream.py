@@ -37,7 +37,6 @@ class PlantStream:
     """Streams the plants of one rack to sinks. ``stamp`` returns the stamp of an instant of rack time."""
 
     def __init__(self, rack: Rack, space: str, stamp: Callable[[int], int]) -> None:
-        """Prepare the topics; no message is sent before ``begin``."""
         self._rack, self._stamp = rack, stamp
         self._plants = [_Plant(driven, rack.plants[driven.name], space) for driven in rack.part.driven]
         self._encode_state, self._encode_joint = encoder(NAMES[PlantState]), encoder(NAMES[JointState])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Sequence
 from functools import partial
+from math import prod
 from typing import Any
 
 from automax_ros.core.kinds import Direction, WriteKind
@@ -15,7 +16,6 @@ from automax_ros.messages.stream.templates import prepared
 from automax_ros.messages.stream.write_messages import WriteMessages
 from automax_ros.messages.types.messages import (
     NAMES,
-    NO_LAYOUT,
     Bool,
     CommonImage,
     CommonWrite,
@@ -82,7 +82,14 @@ def message_maker(variable: CommonVariable) -> Callable[[Any], Message]:
     An array's layout names its dimensions.
     """
     maker: Callable[[Any], Message] = _SCALARS[variable.type]
-    return partial(_ARRAYS[variable.type], _layout(variable.dimensions)) if variable.is_array else maker
+    if not variable.is_array:
+        return maker
+    dimensions = variable.dimensions
+    parts = [
+        MultiArrayDimension(f"subscript{number + 1}", size, prod(dimensions[number:]))
+        for number, size in enumerate(dimensions)
+    ]
+    return partial(_ARRAYS[variable.type], MultiArrayLayout(parts, 0))
 
 
 def value_encoder(variable: CommonVariable) -> Callable[[Any], bytes]:
@@ -110,18 +117,6 @@ def value_encoder(variable: CommonVariable) -> Callable[[Any], bytes]:
     return encode_number
 
 
-def _layout(dimensions: tuple[int, ...]) -> MultiArrayLayout:
-    if not dimensions:
-        return NO_LAYOUT
-    parts = []
-    for number, size in enumerate(dimensions):
-        stride = 1
-        for inner in dimensions[number:]:
-            stride *= inner
-        parts.append(MultiArrayDimension(f"subscript{number + 1}", size, stride))
-    return MultiArrayLayout(parts, 0)
-
-
 class RackMessages:
     """Makes the messages of one run of a rack.
 
@@ -130,7 +125,6 @@ class RackMessages:
     """
 
     def __init__(self, rack: Rack, run_id: int) -> None:
-        """Create it, with the write log numbered from its beginning."""
         self._rack = rack
         self.run_id = run_id
         self.epoch_ns = 0
@@ -182,10 +176,7 @@ class RackMessages:
         values: list[Any] = []
         for view in range(len(self._rack.memory.specs)):
             present = self._rack.memory.present(view)
-            if isinstance(present, list):
-                values += present
-            else:
-                values.append(present)
+            values += present if isinstance(present, list) else [present]
         texts = [values[position] for position in self._text_positions]
         for position in self._text_positions:
             values[position] = 0.0

@@ -62,7 +62,6 @@ class RackStream:
     """Observes a rack and streams it to sinks. ``run_id`` is that of ``RackMessages``."""
 
     def __init__(self, rack: Rack, run_id: int) -> None:
-        """Prepare the topics; no message is sent before ``begin``."""
         space = f"/{rack.config.namespace}"
         self._rack = rack
         self.run_id = run_id
@@ -71,8 +70,8 @@ class RackStream:
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
         slots = [module.config.slot for module in rack.task_modules]
         # If common memory is in another process, the first module with tasks sends the operations of this one.
-        teller = None if rack.part.holds_common_memory else next(iter(slots), None)
-        self.operations_topic = Topic(f"{space}/operations", "automax_msgs/msg/Operation", OPERATION, teller)
+        first = None if rack.part.holds_common_memory else next(iter(slots), None)
+        self.operations_topic = Topic(f"{space}/operations", "automax_msgs/msg/Operation", OPERATION, first)
         self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
         self.scans_topics = {slot: Topic(f"{space}/scans", "automax_msgs/msg/Scan", SCAN, slot) for slot in slots}
         self.states_topics = {
@@ -166,7 +165,7 @@ class RackStream:
         self._send_image(self._rack.now_ns)
         self._send_values(self._values, self._rack.now_ns)
         for task in self._tasks:
-            if not _as_installed(task):
+            if task.compiled.held or task.snapshot() != task.layout.flatten(task.layout.fresh()):
                 self._send_state(task, self._rack.now_ns)
         self._rack.observe(self)
         self.plants.begin()
@@ -246,7 +245,8 @@ class RackStream:
 
     def written(self, writes: list[WriteGroup]) -> None:
         """Send writes from outside and the values that changed."""
-        self._send_writes(writes, self._rack.now_ns)
+        self._send_log(writes)
+        self._send_written(writes, self._rack.now_ns)
 
     def tuned(self, task: Task, now_ns: int) -> None:
         """Send the task's new state: no scan shows that a tunable was set."""
@@ -263,12 +263,11 @@ class RackStream:
     def _value_topics(self, space: str) -> dict[int, _ValueTopic]:
         variables = self._rack.config.variables
         names = topic_names(variable.name for variable in variables)
-        topics = {}
-        for view, variable in enumerate(variables):
-            type_name = topic_type_name(variable)
-            if variable.direction is not Direction.CLOSED and type_name is not None:
-                topics[view] = _ValueTopic(variable, Topic(f"{space}/{names[variable.name]}", type_name, VALUE))
-        return topics
+        return {
+            view: _ValueTopic(variable, Topic(f"{space}/{names[variable.name]}", type_name, VALUE))
+            for view, variable in enumerate(variables)
+            if variable.direction is not Direction.CLOSED and (type_name := topic_type_name(variable)) is not None
+        }
 
     def _send_state(self, task: Task, now_ns: int, takes: Collection[Take] | None = None) -> None:
         stream = self._tasks[task]
@@ -286,17 +285,12 @@ class RackStream:
         if forces is not None:
             _send(forces, self._writes)
 
-    def _send_writes(self, writes: list[WriteGroup], now_ns: int) -> None:
-        self._send_log(writes)
-        self._send_written(writes, now_ns)
-
     def _send_log(self, writes: list[WriteGroup]) -> None:
         for stamp, payload in self._messages.write_bytes(writes):
             for take in self._writes:
                 take(stamp, payload)
 
     def _send_written(self, writes: list[WriteGroup], now_ns: int) -> None:
-        """Send the values of what was written, each once."""
         if len(writes) == 1:
             self._send_values([change[0] for change in writes[0].changes], now_ns)
         else:
@@ -330,10 +324,6 @@ class RackStream:
             stamp = self._messages.stamp(now_ns)
             for take in value.takes:
                 take(stamp, payload)
-
-
-def _as_installed(task: Task) -> bool:
-    return not task.compiled.held and task.snapshot() == task.layout.flatten(task.layout.fresh())
 
 
 def own_from(writes: Sequence[WriteGroup], writer: int) -> int:

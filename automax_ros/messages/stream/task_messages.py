@@ -81,7 +81,6 @@ class TaskMessages:
     """Makes the messages of one task as it is installed. A stamp is in ns."""
 
     def __init__(self, task: Task) -> None:
-        """Store what every message of the task repeats."""
         layout = task.layout
         self.compiled = task.compiled
         self._task = task
@@ -265,14 +264,12 @@ class TaskMessages:
         stamp: int,
         differs: Sequence[bool],
     ) -> bytes:
-        """Return the bytes of a scan by the codec; if such scans recur, prepare a pattern for them."""
         message = self._scan(record, stamp, _changed(self._views, record.latched, differs), full=False)
         if not (message.latched.text or message.read.text or message.written.text or message.committed.text):
             patterns.learn(key, lambda: prepared(message, ("stamp",), _HEAD, *groups))
         return self._encode_scan(message)
 
     def _scan(self, record: ScanRecord, stamp: int, changed: Values, *, full: bool) -> Scan:
-        """Return the message of a scan; ``changed`` is its part about the latch."""
         committed = NO_VALUES
         if record.commits:
             variables, values = zip(*record.commits, strict=True)
@@ -295,12 +292,10 @@ class TaskMessages:
 
 
 def _fitting(number: int) -> int:
-    """Return a number, limited to the greatest uint32."""
     return number if number <= _MOST else _MOST
 
 
 def _columns(entries: Sequence[tuple[int, int, Value]]) -> _Columns:
-    """Return accesses to actual memory as views, elements and values."""
     if not entries:
         return _NO_ENTRIES
     views, elements, values = zip(*entries, strict=True)
@@ -308,7 +303,6 @@ def _columns(entries: Sequence[tuple[int, int, Value]]) -> _Columns:
 
 
 def _changed(views: Sequence[int], latched: Latched, differs: Sequence[bool]) -> Values:
-    """Return the latched values that differ from the ones before; none if ``differs`` is empty."""
     if not differs:
         return NO_VALUES
     return as_values(tuple(compress(views, differs)), (0,) * sum(differs), tuple(compress(latched, differs)))

@@ -54,12 +54,10 @@ class _Builder:
         self._constants: list[bytes] = []
 
     def add_message(self, type_name: str, message: Message, prefix: str = "") -> None:
-        """Add a message, or one inside it, whose fields are identified by ``prefix`` and name."""
         for field, value in zip(message_types()[type_name].definition.fields, message, strict=True):
             self._add_field(field, value, self._group_of.get(prefix + field.name, -1), f"{prefix}{field.name}.")
 
     def finish(self) -> MessageTemplate:
-        """Return the template."""
         self._cut()
         return MessageTemplate(struct.Struct(f"<{self._format}").pack, tuple(self._constants))
 
@@ -123,7 +121,6 @@ class _Builder:
             self._format += f"{padding}x"
 
     def _cut(self) -> None:
-        """End a constant: fields that vary follow, or nothing."""
         constant = struct.pack(f"<{self._fixed}", *self._values)
         self._constants.append(constant)
         self._format += f"{len(constant)}s"
@@ -155,7 +152,6 @@ class TemplateCache:
     """The patterns of one kind of message. ``known`` has those that are prepared, by key."""
 
     def __init__(self) -> None:
-        """Create it without patterns."""
         self.known: dict[Hashable, MessageTemplate] = {}
         self._seen: dict[Hashable, int] = {}
 

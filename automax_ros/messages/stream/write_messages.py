@@ -23,7 +23,6 @@ class WriteMessages:
     """
 
     def __init__(self, slots: Mapping[int, int]) -> None:
-        """Create it, with the numbering at its beginning."""
         self.sequence = 0
         self._slots = slots
         self._patterns = TemplateCache()
@@ -120,7 +119,6 @@ class WriteMessages:
 
 
 def _neighbours(groups: Sequence[WriteGroup]) -> Iterator[Sequence[WriteGroup]]:
-    """Yield the parts whose groups have the same time, writer and kind."""
     begin, first = 0, groups[0]
     for place, group in enumerate(groups):
         if group.time_ns != first.time_ns or group.writer != first.writer or group.kind is not first.kind:

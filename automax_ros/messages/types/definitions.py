@@ -11,24 +11,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-PRIMITIVES = frozenset(
-    {
-        "bool",
-        "byte",
-        "char",
-        "float32",
-        "float64",
-        "int8",
-        "uint8",
-        "int16",
-        "uint16",
-        "int32",
-        "uint32",
-        "int64",
-        "uint64",
-    }
-    | {"string", "wstring"}
-)
+_NUMBERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
+PRIMITIVES = frozenset({"bool", "byte", "char", "float32", "float64", "string", "wstring"} | _NUMBERS)
 TIME = "builtin_interfaces/msg/Time"
 SEPARATOR = "=" * 80
 MAX_SCHEMA_BYTES = 1 << 20
@@ -109,16 +93,11 @@ def parse_definition(name: str, text: str) -> Definition:
         if rest.startswith("="):
             constants.append(Constant(match["name"], match["kind"], rest[1:].strip()))
         else:
-            bound = match["bound"]
-            kind = _resolved(match["kind"], package)
+            bound, kind = match["bound"], match["kind"]
+            if kind not in PRIMITIVES:
+                kind = full_name(kind if "/" in kind else f"{package}/{kind}")
             fields.append(Field(match["name"], kind, match["array"] or "", None if bound is None else int(bound)))
     return Definition(full_name(name), tuple(fields), tuple(constants))
-
-
-def _resolved(kind: str, package: str) -> str:
-    if kind in PRIMITIVES:
-        return kind
-    return full_name(kind if "/" in kind else f"{package}/{kind}")
 
 
 def full_name(name: str) -> str:
@@ -149,19 +128,19 @@ def parse_schema(name: str, text: str) -> dict[str, Definition]:
     definitions: dict[str, Definition] = {}
     part_name = name
     part: list[str] = []
-    lines = iter(text.splitlines())
+    lines = iter([*text.splitlines(), SEPARATOR])
     for line in lines:
         if line.strip() != SEPARATOR:
             part.append(line)
             continue
         definition = parse_definition(part_name, "\n".join(part))
         definitions[definition.name] = definition
-        head = next(lines, "")
+        head = next(lines, None)
+        if head is None:
+            break
         if not head.startswith("MSG: "):
             raise DefinitionError(f"{name}: no 'MSG: pkg/Type' after a line of '='")
         part_name, part = head.removeprefix("MSG: ").strip(), []
-    definition = parse_definition(part_name, "\n".join(part))
-    definitions[definition.name] = definition
     return definitions
 
 

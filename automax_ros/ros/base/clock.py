@@ -49,7 +49,6 @@ class RackClock:
     def __init__(
         self, scheduler: Scheduler, turns: RackLock, *, follows: bool, simulated: SimulatedTime | None
     ) -> None:
-        """Create the pacer; a simulated rack does not follow ``/clock``, even if all nodes are to."""
         self._site: RackContext | None = None
         self._node: ModuleNode | None = None
         self._topic = CLOCK
@@ -125,7 +124,6 @@ class RackClock:
             self._follower.heard(clock_ns)
 
     def _look_around(self, own: int) -> None:
-        """Warn if more than one node publishes ``/clock``."""
         assert self._node is not None
         assert self._site is not None
         if self._throttle.passes() and self._node.count_publishers(self._topic) > 1:

@@ -43,7 +43,6 @@ class Diagnostics:
     """Publishes the statuses of its sources. Call ``begin`` once, with the node that publishes."""
 
     def __init__(self) -> None:
-        """Create it without sources."""
         self._sources: list[Source] = []
         self._levels: dict[str, bytes] = {}
         self._counts: dict[str, int] = {}
@@ -110,7 +109,6 @@ class Diagnostics:
         self._next_look_ns = now_ns + (SHORTEST_NS if self._look(now_ns) else LOOK_NS)
 
     def _look(self, now_ns: int) -> bool:
-        """Publish if a level has changed, and return whether it has."""
         self._changed = False
         statuses = self._statuses(now_ns)
         if {item.name: item.level for item in statuses} == self._levels:

@@ -41,7 +41,6 @@ class Background:
     """
 
     def __init__(self, node: Node) -> None:
-        """Store the node whose executor gets the results."""
         self._node, self._closed = node, False
 
     def do(self, work: Callable[[], Any], finish: Callable[[Any, Exception | None], None]) -> None:
@@ -72,7 +71,6 @@ class ManagedModuleNode(LifecycleNode, ModuleNode):
     """Node of one module; a lifecycle manager can stop, delete, reload and run its tasks."""
 
     def __init__(self, site: RackContext, module: Module) -> None:
-        """Join the graph: the tasks are installed, so the node is inactive."""
         ModuleNode.__init__(self, site, module.config.name)
         self.work = Background(self)
         self._duties_of_tasks = ModuleLifecycle(self, module)
@@ -160,7 +158,6 @@ class ModuleLifecycle:
             raise TransitionRefused(str(refused)) from refused
 
     def _reload(self, names: list[str], finish: Callable[[Exception | None], None]) -> None:
-        """Reload tasks one after the other, then call ``finish``."""
         if not names:
             finish(None)
             self._node.follow_tasks()

@@ -58,7 +58,6 @@ class RackRosNode(Node):  # type: ignore[misc]
     def __init__(
         self, name: str, namespace: str, context: Context, health: Health, arguments: RosArguments = NO_ARGUMENTS
     ) -> None:
-        """Join the graph; ``namespace`` is the rack's, without a leading slash."""
         self._adopted: set[Any] = set()
         follows = follows_clock(arguments, namespace)
         own_time = [Parameter(SIM_TIME, value=follows)]
@@ -184,7 +183,6 @@ class ModuleNode(RackRosNode):
     """A module's node: in the rack's namespace, on its time, and guarded against bad parameter requests."""
 
     def __init__(self, site: RackContext, name: str) -> None:
-        """Join the graph."""
         super().__init__(name, site.rack.config.namespace, site.context, site.health, site.arguments)
         self.site = site
         self.served_by(site.intake)

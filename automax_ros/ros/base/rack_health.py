@@ -24,7 +24,6 @@ class RackHealth:
     """
 
     def __init__(self, site: RackContext, part: str) -> None:
-        """Create it for a rack; ``part`` is the name of the status without the rack's namespace."""
         self._site, self._part = site, part
 
     def statuses(self, now_ns: int) -> list[DiagnosticStatus]:
@@ -53,7 +52,6 @@ class RackHealth:
         return [status_of(name, rack.config.name, level, text, values)]
 
     def _judged(self, skipped: int, troubles: int) -> tuple[bytes, str]:
-        """Return level and text of the most serious condition."""
         operations, diagnostics = self._site.rack.operations, self._site.diagnostics
         newly_skipped = diagnostics.newly(OVERRUNS, skipped)
         newly_troubled = diagnostics.newly("troubles", troubles)

@@ -111,7 +111,6 @@ class ScaledWriter:
     """Converts a topic's values to counts of a variable. Values beyond the scale are clamped; the first is logged."""
 
     def __init__(self, node: ModuleNode, topic: str, variable: CommonVariable, scale: Scale, unit: str) -> None:
-        """Create it; ``unit`` appears in messages."""
         self._node, self._topic, self._variable = node, topic, variable
         self._scale, self._unit, self._is_told = scale, unit, False
 

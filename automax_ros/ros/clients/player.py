@@ -228,7 +228,6 @@ class Player:
         return True
 
     def _shift(self, now: int) -> None:
-        """Move all deadlines by the time spent in the pause."""
         passed = max(0, now - self._paused_since)
         self._paused_since += passed
         self._zero_ns += passed
@@ -286,7 +285,6 @@ class _Outlet:
             raise CdrError(f"not of type {self.topic.type_name}: {str(error)[:120]}") from error
 
     def unconfirmed(self) -> bool:
-        """Whether a subscriber has not acknowledged all messages yet."""
         from rclpy.duration import Duration
 
         return not self.publisher.wait_for_all_acked(Duration(nanoseconds=NS_PER_MS))

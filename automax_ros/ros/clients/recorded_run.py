@@ -75,7 +75,6 @@ class RecordedRun:
     """The programs of one run of one rack."""
 
     def __init__(self, node: Node, space: str) -> None:
-        """Create it unbound; ``space`` is the rack's namespace with its slash."""
         self._node, self._space = node, space
         self._home = b""
         self._others: set[bytes] = set()

@@ -70,7 +70,6 @@ class RecorderWait:
     """Checks whether a recorder has subscribed to the topics of one process."""
 
     def __init__(self, site: RackContext, node: ModuleNode, *others: str) -> None:
-        """Check the topics that the stream of this process publishes, and ``others``, topics of the rack."""
         self._node = node
         self._space, self._name = f"/{site.rack.config.namespace}", recorder_name(site.arguments)
         recorded = LiveTopics.expected(self._space, site.rack.config).all
@@ -158,7 +157,6 @@ class LiveRecorder:
     """
 
     def __init__(self, space: str, arguments: RosArguments = NO_ARGUMENTS) -> None:
-        """Join the graph; ``space`` is the rack's namespace with its slash."""
         self.recording: LiveRecording | None = None
         self.lost_values: Counter[str] = Counter()
         self._space = space
@@ -328,7 +326,6 @@ class LiveRecorder:
                 self._order.add(found.sent_ns, (topic, found.payload or b""))
 
     def _ours(self, subscription: RawSubscription) -> Iterator[RawMessage]:
-        """Yield the messages received from the rack."""
         topic, binding = subscription.topic, self.binding
         for found in subscription.taken():
             if binding.is_ours(topic, found):
@@ -337,7 +334,6 @@ class LiveRecorder:
                 binding.keep(found)
 
     def _meet_processes(self) -> None:
-        """Find the participants that are processes of a distributed rack."""
         if self._presences is None:
             return
         for found in self._presences.taken():

@@ -325,7 +325,6 @@ class DistributedMemory:
         self._when_begun(lambda: self.link.merge(picture))
 
     def _latest_ns(self, told_epoch_ns: int = 0) -> int:
-        """Return the latest rack time that a message of another process can have."""
         epoch_ns = self.peers.epoch_ns or told_epoch_ns
         passed_ns = time.time_ns() - epoch_ns if epoch_ns else LONGEST_RUN_NS
         return max(self._rack.now_ns, passed_ns) + AHEAD_NS

@@ -45,7 +45,6 @@ class BusTopic:
         refuse: Callable[[str, str], None],
         terms: Terms,
     ) -> None:
-        """Subscribe, and register at the message intake."""
         subscription = node.own_subscription(message_class(type_name), topic, qos)
         self._topic, self._type_name, self._then = topic, type_name, terms.then
         self._receive, self._refuse = node.guarded_callback(topic, receive), refuse

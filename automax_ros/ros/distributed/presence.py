@@ -30,7 +30,6 @@ class PresencePublisher:
     """Publishes the presence of a rack that is whole in this process."""
 
     def __init__(self, site: RackContext, node: ModuleNode) -> None:
-        """Create publisher and subscription; the first presence is published after a second."""
         self._site, self._process = site, int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._publisher = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
         kind, terms = "automax_msgs/msg/Presence", Terms(_MOST_BYTES)

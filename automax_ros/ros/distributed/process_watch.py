@@ -26,7 +26,6 @@ class ProcessWatch:
     """Watches processes that have announced themselves. Always call ``close``."""
 
     def __init__(self) -> None:
-        """Create it without processes."""
         self._files: dict[int, int] = {}
 
     def lives(self, presence: Presence) -> bool | None:

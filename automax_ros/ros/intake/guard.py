@@ -31,7 +31,6 @@ class Throttle:
     """
 
     def __init__(self, interval_s: float) -> None:
-        """Create it ready to pass."""
         self._interval_s = interval_s
         self._next_s = 0.0
 
@@ -48,7 +47,6 @@ class RequestGuard:
     """Reports failures to ``health``, and the first ones to ``log``."""
 
     def __init__(self, health: Health, log: Callable[[str], object]) -> None:
-        """Store where failures are reported."""
         self._health, self._log = health, log
 
     def report(self, what: str, error: Exception) -> None:

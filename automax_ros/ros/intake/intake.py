@@ -61,7 +61,6 @@ class MessageIntake:
     """Takes messages and requests from its entrances, on a separate thread between ``open`` and ``close``."""
 
     def __init__(self, report: Callable[[str, Exception], None]) -> None:
-        """Create it without a thread; ``report`` is called with exceptions of entrances."""
         self._report = report
         self._lock = threading.Lock()
         self._entrances: list[Entrance] = []
@@ -134,7 +133,6 @@ class MessageIntake:
                 last, rounds = self._some(self._last, 1)[1], 0
 
     def _woken(self, patience_s: float) -> list[Entrance]:
-        """Return the entrances that may have messages, after a wait if there are none."""
         if self._poll is None:
             time.sleep(_LOOK_S)
             with self._lock:
@@ -147,7 +145,6 @@ class MessageIntake:
             return [entrance for group in groups for entrance in group.rung()]
 
     def _round(self, ready: deque[Entrance]) -> None:
-        """Take from each entrance in turn; one that may have more stays in the queue."""
         room = MOST_A_ROUND
         for _ in range(len(ready)):
             if not room or self._closing:
@@ -204,7 +201,6 @@ class _Group:
             raise RuntimeError(f"{entrance.name} cannot be watched: rcl returns {result}")
 
     def rung(self) -> list[Entrance]:
-        """Reset the counter, and return the entrances unless it was 0."""
         try:
             os.eventfd_read(self.counter)
         except BlockingIOError:
@@ -212,7 +208,6 @@ class _Group:
         return list(self.entrances)
 
     def close(self) -> None:
-        """Detach the entrances and close the counter."""
         rcl = library()
         assert rcl is not None
         for entrance in self.entrances:

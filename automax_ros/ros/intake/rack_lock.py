@@ -18,7 +18,6 @@ class RackLock:
     """The reentrant lock of a rack: ``with lock`` to access it, ``with lock.for_scan`` to scan."""
 
     def __init__(self) -> None:
-        """Create it unlocked."""
         self._lock = threading.RLock()
         self._owner = 0
         self._depth = 0
@@ -33,7 +32,6 @@ class RackLock:
         self._enter()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Release the lock."""
         self._leave()
 
     def _enter(self) -> None:
@@ -64,5 +62,4 @@ class _Scanner:
         self._turns._enter_first()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Release the lock."""
         self._turns._leave()

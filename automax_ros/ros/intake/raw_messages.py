@@ -125,7 +125,6 @@ class SequenceTracker:
     """The number of the last message of each sender."""
 
     def __init__(self) -> None:
-        """Create it without senders."""
         self._last: dict[bytes, int] = {}
 
     def missing(self, taken: RawMessage) -> int | None:

@@ -52,7 +52,6 @@ class ServiceRequests:
     """Receives the requests of one rclpy service."""
 
     def __init__(self, rcl: Library, service: Any, refuse: Refuse) -> None:
-        """Take over the service: no executor may serve it any more."""
         self.name, self.handle = service.srv_name, service.handle
         self._rcl, self._service, self._kind, self._refuse = rcl, service, service.srv_type, refuse
         self._request, self._response = Conversion(self._kind.Request), Conversion(self._kind.Response)

@@ -40,7 +40,6 @@ class CommonMemoryNode(ModuleNode):
     """Serves the topics of common memory; its callbacks run between scans."""
 
     def __init__(self, site: RackContext) -> None:
-        """Create publishers and subscriptions; messages flow once the stream begins."""
         super().__init__(site, "common_memory")
         rack, stream = site.rack, site.stream
         outlets: dict[Topic, Take] = {}
@@ -63,8 +62,6 @@ class CommonMemoryNode(ModuleNode):
         self.diagnose(self._module_health)
 
     def _with_files(self, publish: Take) -> Take:
-        """Return a function that publishes an operation and, after a reload, the files that the rack now runs from."""
-
         def take(stamp: int, payload: bytes) -> None:
             self.offer_files()
             publish(stamp, payload)

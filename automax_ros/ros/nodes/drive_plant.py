@@ -29,7 +29,6 @@ class DrivePlantNode(ModuleNode):
     """Serves the plant of one drive."""
 
     def __init__(self, site: RackContext, driven: DrivenPlant) -> None:
-        """Create publishers and, where ROS may load the shaft, the subscription."""
         super().__init__(site, "_".join(filter(None, ("drive_plant", str(driven.slot), driven.drive))))
         self._driven, self._plant = driven, site.rack.plants[driven.name]
         outlets = {topic: self.outlet(topic) for topic in site.stream.plants.topics if topic.plant == driven.name}

@@ -16,7 +16,6 @@ class IoModuleNode(ModuleNode):
     """Serves one I/O module."""
 
     def __init__(self, site: RackContext, module: Module) -> None:
-        """Create the publisher."""
         super().__init__(site, module.config.name)
         self._module = module.config
         self._bank = site.rack.backplane.bank(module.config.slot)
@@ -25,7 +24,6 @@ class IoModuleNode(ModuleNode):
         self.diagnose(self._health)
 
     def _health(self, _: int) -> list[DiagnosticStatus]:
-        """Return the registers as hexadecimal words; the module itself is always OK."""
         values = {}
         if self._bank is not None:
             for register in self._shown:

@@ -29,7 +29,6 @@ class JointInlet:
     """Receives the commands of one joint by one interface."""
 
     def __init__(self, node: ModuleNode, command: JointCommand) -> None:
-        """Subscribe."""
         self._node, self._command = node, command
         variables = node.site.rack.config.variables
         self._view, self._variable = _place(variables, command.common)

@@ -44,7 +44,6 @@ class NetworkNode(ModuleNode):
     """Serves one network module."""
 
     def __init__(self, site: RackContext, module: Module) -> None:
-        """Join the network."""
         super().__init__(site, module.config.name)
         assert isinstance(module, Station)
         self._module, self._slot, self._model = module, module.config.slot, module.config.model
@@ -80,7 +79,6 @@ class NetworkNode(ModuleNode):
             self._publish(stamp, encode(message))
 
     def _look(self) -> None:
-        """Pass the messages received to the module, and report its status if that has changed."""
         waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
         if waiting:
             arrived = [_read(payload) for payload in waiting]

@@ -45,7 +45,6 @@ class ProcessorNode(ManagedModuleNode):
     """Node of one Processor; the scheduler of the rack scans its tasks."""
 
     def __init__(self, site: RackContext, processor: Module) -> None:
-        """Create publishers and parameters, and observe the rack."""
         super().__init__(site, processor)
         rack, stream = site.rack, site.stream
         self._rack, self._module = rack, processor.config
@@ -104,7 +103,6 @@ class ProcessorNode(ManagedModuleNode):
         return [self._module_status(tasks), *tasks]
 
     def _module_status(self, tasks: list[DiagnosticStatus]) -> DiagnosticStatus:
-        """Return the health of the module itself: the worst of its tasks'."""
         config, statistics = self._module, [self._rack.statistics[task.name] for task in self._tasks]
         level, running = worst(tasks), sum(task.status is Status.RUNNING for task in self._tasks)
         values = {
@@ -169,7 +167,6 @@ class UdcNode(ProcessorNode):
     """Node of one UDC."""
 
     def __init__(self, site: RackContext, udc: Module) -> None:
-        """Create publishers and parameters, and observe the rack."""
         self._udc = udc
         super().__init__(site, udc)
 

@@ -119,7 +119,6 @@ class RackNode(LifecycleNode, RackRosNode):
         enter: Callable[[Callable[[], None]], None],
         arguments: RosArguments = NO_ARGUMENTS,
     ) -> None:
-        """Join the graph, unconfigured; the arguments are those of ``RackRosNode`` and ``LifecycleNode.manage``."""
         RackRosNode.__init__(self, MAIN_NODE, namespace, context, health, arguments)
         self.health = health
         self.manage(duties, self.guard, enter)

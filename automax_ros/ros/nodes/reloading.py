@@ -23,7 +23,6 @@ class Reloading:
     """Executes the reload requests of one node; call ``close`` when it leaves the graph."""
 
     def __init__(self, node: ModuleNode, orders: OperatorRequests, conclude: Conclude) -> None:
-        """Create it without a reload in progress."""
         self._site, self._orders, self._conclude = node.site, orders, conclude
         self._work = Background(node)
         self._reloading = ""

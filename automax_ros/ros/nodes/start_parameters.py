@@ -82,14 +82,12 @@ def _reaches_rack(item: GivenParameter, arguments: RosArguments, config: RackCon
 
 
 def _names(config: RackConfig, declared: Mapping[str, Iterable[str]]) -> set[str]:
-    """Return the names of a rack's nodes, those in other processes included."""
     return {MAIN_NODE, *declared, *(module.name for module in config.modules)}
 
 
 def _reached(
     item: GivenParameter, arguments: RosArguments, config: RackConfig, declared: Mapping[str, Iterable[str]]
 ) -> set[str]:
-    """Return the nodes that a parameter is for."""
     only = replace(arguments, parameters=(item,))
     return {name for name in _names(config, declared) if only.given_to(name, config.namespace, main=name == MAIN_NODE)}
 

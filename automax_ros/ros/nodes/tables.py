@@ -61,7 +61,6 @@ class JoinedTasks:
     """Receives the parts; ``changed`` is called after each. For the process with common memory."""
 
     def __init__(self, node: ModuleNode, changed: Callable[[], None]) -> None:
-        """Subscribe."""
         self._site, self._changed = node.site, changed
         rack = node.site.rack
         self._tasks = {
@@ -97,7 +96,6 @@ class StatusTables:
     """Publishes the tables of this process, by the publishers of one node."""
 
     def __init__(self, node: ModuleNode) -> None:
-        """Create the publishers; the first tables are published when the rack starts."""
         self._rack, self._stream, self._pace = node.site.rack, node.site.stream, node.site.pacer
         part = self._rack.part
         self._tasks = node.create_publisher(TaskTable, "tasks" if part.holds_common_memory else PARTS, ros_qos(LATCHED))

@@ -92,7 +92,6 @@ class TunableParameters:
     """Keeps the parameters of a node equal to the tunables of its tasks."""
 
     def __init__(self, node: Node, rack: Rack, present: Callable[[], AbstractContextManager[None]]) -> None:
-        """Create it for a node; ``present`` is entered while a task is tuned."""
         self._node, self._rack, self._present = node, rack, present
         self._tunables: dict[str, Tunable] = {}
         self._following = 0
@@ -165,7 +164,6 @@ class TunableParameters:
         return SetParametersResult(successful=True)
 
     def _tune(self, parameters: list[Parameter[Any]]) -> None:
-        """Tune tasks by the parameters that have been set."""
         chosen = [(self._tunables[item.name], item.value) for item in parameters if item.name in self._tunables]
         if not chosen or self._is_own_doing:
             return

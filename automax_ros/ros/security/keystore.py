@@ -37,7 +37,6 @@ class Keystore:
     """
 
     def __init__(self, folder: Path, domain: int) -> None:
-        """Create the authority, unless it exists, and the governance of a ROS domain."""
         self.folder, self._domain = folder, domain
         self._certificate = folder / "public" / "ca.cert.pem"
         self._key = folder / "private" / "ca.key.pem"
@@ -89,7 +88,6 @@ class Keystore:
         request.unlink()
 
     def _sign(self, stem: Path, text: str) -> None:
-        """Write a text, and its signed form, which DDS reads."""
         plain = stem.with_suffix(".xml")
         plain.write_text(text, encoding="utf-8")
         _openssl("smime", "-sign", "-text", "-in", plain, "-out", stem.with_suffix(".p7s"),

@@ -89,7 +89,6 @@ def wheels_installed() -> bool:
 
 
 def _needed_changes() -> dict[str, str]:
-    """New values of the variables that lead to another ROS 2 installation; empty in an ordinary shell."""
     changes = {}
     libraries = _entries("LD_LIBRARY_PATH")
     own = _own_library_folders()
@@ -116,7 +115,6 @@ def _entries(variable: str) -> list[str]:
 
 
 def _restart(changes: dict[str, str]) -> None:
-    """Replace this process by the same command line with other variables; does not return."""
     sys.stdout.flush()
     sys.stderr.flush()
     os.execve(sys.executable, sys.orig_argv, {**os.environ, **changes, _RESTARTED: "1"})
@@ -150,7 +148,6 @@ def _check_messages() -> None:
 
 
 def _cure() -> str:
-    """The command that builds what is missing, for the kind of installation this is."""
     if not wheels_installed() and os.environ.get("AMENT_PREFIX_PATH"):
         return f"run `{COLCON_COMMAND}` in the workspace and source install/setup.bash"
     return f"run `{SETUP_COMMAND}` and use the programs in .venv/bin"

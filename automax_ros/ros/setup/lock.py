@@ -45,7 +45,6 @@ class InstanceLock:
     """
 
     def __init__(self, namespace: str, domain: int, seat: str | None = None) -> None:
-        """Name the lock, without taking it."""
         self._rack, self._seat = f"rack /{namespace} in ROS domain {domain}", seat
         name = f"automax_ros_{os.getuid()}_{domain}_{namespace.replace('/', '.')}"
         self._path = Path(tempfile.gettempdir()) / f"{name}.lock"
@@ -74,7 +73,6 @@ class InstanceLock:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Free the lock, and remove its files."""
         self._free()
 
     def _take(self, path: Path, what: str, how: int) -> None:

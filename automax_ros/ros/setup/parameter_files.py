@@ -146,7 +146,6 @@ def _value(node: Node, place: str) -> ParameterValue:
 
 
 def _scalar(node: Scalar) -> bool | int | float | str | None:
-    """Return a value as rcl reads it."""
     text = node.text
     if not node.plain:
         return text
