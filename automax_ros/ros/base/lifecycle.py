@@ -15,6 +15,7 @@ from lifecycle_msgs.msg import Transition
 from rclpy.lifecycle import LifecycleNodeMixin, TransitionCallbackReturn
 
 from automax_ros.core.text import printable
+from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.ros.intake.guard import MOST_TOLD, RequestGuard
 from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred
 
@@ -64,7 +65,7 @@ class LifecycleCallbacks(Protocol):
     """The actions of a node's transitions.
 
     Raises:
-        TransitionRefused: by any of them, if it cannot be executed; the node keeps its state.
+        TransitionRefused, OperationRefused: by any of them, if it cannot be executed; the node keeps its state.
         Exception: an unforeseen error of the program: ``fail`` is called, and the node becomes unconfigured.
     """
 
@@ -112,10 +113,16 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         """
         LifecycleNodeMixin.__init__(self)
         self._duties, self._guard, self._enter = duties, guard, enter
-        asked = self._service_change_state
-        asked.callback = self._asked
-        allow_deferred(asked)
-        for service in (asked, self._service_get_state, *self._descriptions()):
+        change = self._service_change_state
+        change.callback = self._requested
+        allow_deferred(change)
+        for service in (
+            change,
+            self._service_get_state,
+            self._service_get_available_states,
+            self._service_get_available_transitions,
+            self._service_get_transition_graph,
+        ):
             guard.service(service)
 
     @property
@@ -133,6 +140,9 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         duty: Callable[[], Pending | None] = getattr(self._duties, transition)
         try:
             pending = duty()
+        except OperationRefused as refused:
+            self._conclude(transition, TransitionRefused(str(refused)), done)
+            return
         except Exception as error:
             self._conclude(transition, error, done)
             return
@@ -152,13 +162,6 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         super().destroy_node()
         self._state_machine.destroy_when_not_in_use()
 
-    def _descriptions(self) -> tuple[Any, ...]:
-        return (
-            self._service_get_available_states,
-            self._service_get_available_transitions,
-            self._service_get_transition_graph,
-        )
-
     def _trigger(self, label: str) -> None:
         try:
             self._state_machine.trigger_transition_by_label(label, True)
@@ -169,14 +172,14 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         """End a transition: with success, failure, or, after an unforeseen exception, error processing."""
         result = _SUCCESS if error is None else _FAILURE if isinstance(error, TransitionRefused) else _ERROR
         if result is _FAILURE:
-            self._tell(transition, str(error))
+            self._refuse(transition, str(error))
         self._trigger(result.to_label())
         if result is _ERROR and error is not None:
             self._guard.report(f"transition {transition} failed, everything is stopped", error)
-            self._trigger(self._failed().to_label())
+            self._trigger(self._stopped().to_label())
         done(error)
 
-    def _failed(self) -> TransitionCallbackReturn:
+    def _stopped(self) -> TransitionCallbackReturn:
         try:
             self._duties.fail()
         except Exception as error:
@@ -184,11 +187,11 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
             return _FAILURE
         return _SUCCESS
 
-    def _asked(self, request: Any, response: Any) -> Any:
+    def _requested(self, request: Any, response: Any) -> Any:
         name = _name(request.transition)
         reason = self._duties.refusal(name) if name else "it is not a transition that can be asked for"
         if reason is not None:
-            self._tell(name or printable(request.transition.label[:MOST_TOLD]), reason)
+            self._refuse(name or printable(request.transition.label[:MOST_TOLD]), reason)
             return response
 
         def begin(respond: Respond) -> None:
@@ -204,13 +207,13 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         try:
             self.change(transition, done)
         except TransitionRefused as refused:
-            self._tell(transition, str(refused))
+            self._refuse(transition, str(refused))
             done(refused)
         except Exception as error:
             self._guard.report(f"transition {transition}", error)
             done(error)
 
-    def _tell(self, transition: str, reason: str) -> None:
+    def _refuse(self, transition: str, reason: str) -> None:
         self.get_logger().warning(f"transition {transition} refused: {reason}")
         self._guard.refused(transition, reason[:MOST_TOLD], reason[:MOST_TOLD])
 

@@ -129,20 +129,20 @@ class ModuleLifecycle:
 
     def activate(self) -> None:
         """Put the tasks into RUN."""
-        self._asked(self._tasks.run)
+        self._tasks.run()
 
     def deactivate(self) -> None:
         """Stop the tasks; a critical one cannot be stopped on its own."""
-        self._asked(self._tasks.stop)
+        self._tasks.stop()
 
     def cleanup(self) -> None:
         """Delete the tasks."""
-        self._asked(self._tasks.delete)
+        self._tasks.delete()
 
     def shutdown(self) -> None:
         """Stop and delete the tasks: the node stays in the graph, finalized, until the program ends (decision)."""
-        self._asked(self._tasks.stop)
-        self._asked(self._tasks.delete)
+        self._tasks.stop()
+        self._tasks.delete()
 
     def fail(self) -> None:
         """STOP ALL, so that no output stays on, and delete the module's tasks."""
@@ -150,12 +150,6 @@ class ModuleLifecycle:
         if operations.powered:
             operations.stop_all(f"a transition of {self._node.get_name()} failed")
             self._tasks.delete()
-
-    def _asked(self, operation: Callable[[], None]) -> None:
-        try:
-            operation()
-        except OperationRefused as refused:
-            raise TransitionRefused(str(refused)) from refused
 
     def _reload(self, names: list[str], finish: Callable[[Exception | None], None]) -> None:
         if not names:

@@ -61,7 +61,7 @@ class RackRosNode(Node):  # type: ignore[misc]
         self._adopted: set[Any] = set()
         follows = follows_clock(arguments, namespace)
         own_time = [Parameter(SIM_TIME, value=follows)]
-        space = f"/{namespace}"
+        space = f"/{namespace}"  # the rack's
         self.own_name = name
         name = arguments.name_of(name, main=name == MAIN_NODE)
         # Rules of a foreign context for all nodes must not move the rack, or give all its nodes one name.
@@ -140,19 +140,10 @@ def _keep_time(follows: bool, parameters: list[Parameter[Any]]) -> SetParameters
 
 @dataclass(frozen=True)
 class RackContext:
-    """One rack in this process, and what its nodes share.
+    """One rack in this process, and what its nodes share: ``context`` is rclpy's, of all of them.
 
-    Attributes:
-        rack: the rack.
-        stream: the messages that it publishes.
-        pacer: keeps its time.
-        context: rclpy's context of all nodes.
-        health: counts the problems that they report.
-        intake: receives messages and requests.
-        arguments: their ROS arguments from the command line.
-        diagnostics: publishes their health.
-        lock: held by the thread that accesses the rack; one at a time, between scans.
-        is_recorded: whether a recorder started with it must receive every message of a stream.
+    The thread that accesses the rack holds ``lock``, one at a time, between scans. ``is_recorded``: a recorder that was
+    started with it must receive every message of a stream.
     """
 
     rack: Rack

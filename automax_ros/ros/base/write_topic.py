@@ -10,9 +10,12 @@ from typing import Any
 from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
 from rclpy.qos import QoSPolicyKind
 
+from automax_ros.core.types import Value
 from automax_ros.messages.cdr.cdr import MAX_TRAILING, CdrError, decode
 from automax_ros.messages.types.topics import QosProfile
+from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rackfile.model.config import CommonVariable
+from automax_ros.rackfile.model.writers import ROS_WRITER
 from automax_ros.rackfile.reading.scale import Scale
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import message_class, ros_qos
@@ -32,6 +35,10 @@ DROPPED = "dropped message"
 class WriteTopic:
     """Receives a topic's messages from reliable and best-effort publishers; calls ``take`` between two scans.
 
+    ``take`` gets the decoded message (a class of ``messages/types/messages``); what it refuses with MemoryValueError or
+    OperationRefused is reported, as a write to ``target``. ``most_bytes`` is the size of the longest valid message,
+    without its header of 4 bytes.
+
     Messages wait in DDS, at most ten of them, and ``MessageIntake`` takes them as bytes: one that is malformed, or
     longer than the topic's messages can be, is refused unread. A reliable subscription alone would not match
     best-effort publishers; a best-effort one alone would lose messages of reliable ones. So a best-effort one is
@@ -40,43 +47,41 @@ class WriteTopic:
     """
 
     def __init__(
-        self, node: ModuleNode, topic: str, type_name: str, take: Callable[[Any], None], most_bytes: int
+        self, node: ModuleNode, topic: str, type_name: str, take: Callable[[Any], None], most_bytes: int, target: str
     ) -> None:
-        """Subscribe.
+        def write(message: Any) -> None:
+            try:
+                take(message)
+            except (MemoryValueError, OperationRefused) as error:
+                self._refuse(target, error)
 
-        Args:
-            node: the node that subscribes.
-            topic: the topic's name.
-            type_name: the type of its messages, such as ``std_msgs/msg/Int16``.
-            take: called between two scans with the decoded message (a class of ``messages/types/messages``).
-            most_bytes: size of the longest valid message, without its header of 4 bytes.
-        """
         self._node, self._topic, self._type_name = node, topic, type_name
-        self._take = node.guarded_callback(topic, take)
+        self._take = node.guarded_callback(topic, write)
         self._class, self._most_bytes = message_class(type_name), len(b"\0\1\0\0") + most_bytes + MAX_TRAILING
-        self._hears_best_effort = self._is_best_effort = False
+        self._reads_best_effort = self._is_best_effort = False
         self._throttle, self._senders = Throttle(REFUSAL_INTERVAL_S), SequenceTracker()
-        self._subscribe(
-            COMMAND, SubscriptionEventCallbacks(incompatible_qos=node.guarded_callback(topic, self._not_heard))
-        )
+        incompatible = node.guarded_callback(topic, self._incompatible)
+        self._subscribe(COMMAND, SubscriptionEventCallbacks(incompatible_qos=incompatible))
 
-    def refuse(self, of: str, reason: Exception) -> None:
-        """Report a refused message, at most once per second in the log; ``of`` is what it would have written."""
-        refusal = f"write refused: {reason}"
-        self._node.site.health.note(REFUSED, of, lambda: refusal)
+    def _refuse(self, target: str, reason: Exception) -> None:
+        self._report(REFUSED, target, f"write refused: {reason}")
+
+    def _report(self, kind: str, key: str, text: str, times: int = 1) -> None:
+        """Count a problem; log it, at most once per second."""
+        self._node.site.health.note(kind, key, lambda: text, times=times)
         if self._throttle.passes():
-            self._node.get_logger().warning(refusal)
+            self._node.get_logger().warning(text)
 
     def _subscribe(self, qos: QosProfile, events: SubscriptionEventCallbacks | None) -> None:
         subscription = self._node.own_subscription(self._class, self._topic, ros_qos(qos), events)
         receive = partial(self.receive, reliable=qos is COMMAND)
         self._node.site.intake.add(TopicReader(subscription, self._most_bytes, receive))
 
-    def _not_heard(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
+    def _incompatible(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
         if info.last_policy_kind != QoSPolicyKind.RELIABILITY:
             self._node.misfit(f"what a writer of {self._topic} sends is lost", info)
-        elif not self._hears_best_effort:
-            self._hears_best_effort = True
+        elif not self._reads_best_effort:
+            self._reads_best_effort = True
             self._subscribe(BEST_EFFORT_COMMAND, None)
 
     def receive(self, taken: RawMessage, *, reliable: bool) -> None:
@@ -86,7 +91,8 @@ class WriteTopic:
             if missing is None:
                 return
             if missing:
-                self._note_dropped(missing)
+                text = f"{self._topic}: messages come faster than they can be taken; the oldest were dropped"
+                self._report(DROPPED, self._topic, text, missing)
         else:
             self._is_best_effort |= not reliable
             if reliable and self._is_best_effort:
@@ -96,15 +102,32 @@ class WriteTopic:
                 raise CdrError(f"a message of {taken.size:,} bytes, where {self._most_bytes:,} are the most")
             message = decode(self._type_name, taken.payload)
         except CdrError as error:
-            self.refuse(self._topic, CdrError(f"{self._topic}: {error}"))
+            self._refuse(self._topic, CdrError(f"{self._topic}: {error}"))
         else:
             self._take(message)
 
-    def _note_dropped(self, missing: int) -> None:
-        text = f"{self._topic}: messages come faster than they can be taken; the oldest were dropped"
-        self._node.site.health.note(DROPPED, self._topic, lambda: text, times=missing)
-        if self._throttle.passes():
-            self._node.get_logger().warning(text)
+
+def subscribe_variable(
+    node: ModuleNode,
+    topic: str,
+    type_name: str,
+    view: int,
+    elements_of: Callable[[Any], list[tuple[int, Value]]],
+    most_bytes: int,
+) -> None:
+    """Subscribe to a topic that writes a common variable, as the writer ``ros``.
+
+    ``elements_of`` returns the (element, value) that a message writes; it raises MemoryValueError if it is refused.
+    """
+    rack = node.site.rack
+    variable = rack.config.variables[view]
+
+    def take(message: Any) -> None:
+        if not rack.operations.powered and not rack.config.is_input(variable):
+            raise MemoryValueError(f"the power is off, and {variable.name} is not an input")
+        rack.write_view(view, elements_of(message), ROS_WRITER)
+
+    WriteTopic(node, topic, type_name, take, most_bytes, variable.name)
 
 
 class ScaledWriter:
@@ -112,7 +135,7 @@ class ScaledWriter:
 
     def __init__(self, node: ModuleNode, topic: str, variable: CommonVariable, scale: Scale, unit: str) -> None:
         self._node, self._topic, self._variable = node, topic, variable
-        self._scale, self._unit, self._is_told = scale, unit, False
+        self._scale, self._unit, self._is_logged = scale, unit, False
 
     def counts(self, value: float) -> int:
         """Return the counts of a value.
@@ -127,7 +150,7 @@ class ScaledWriter:
             text = f"{self._topic}: {value:.8g} {self._unit}".rstrip()
             text += f" lies beyond the scale: {self._variable.name} is {counts} counts"
             self._node.site.health.note("clamped value", self._variable.name, lambda: text)
-            if not self._is_told:
-                self._is_told = True
+            if not self._is_logged:
+                self._is_logged = True
                 self._node.get_logger().warning(text)
         return counts

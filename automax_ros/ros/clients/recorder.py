@@ -39,7 +39,7 @@ from automax_ros.recordings.write.data_file import StorageOptions
 from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class
 from automax_ros.ros.clients.recorded_run import MOST_TABLES, RecordedRun, participant
-from automax_ros.ros.intake.raw_messages import RawMessage, taker_of
+from automax_ros.ros.intake.raw_messages import RawMessage, reader_of
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.process import joined_context
 
@@ -114,11 +114,11 @@ class RawSubscription:
             durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
         )
         self._subscription = node.create_subscription(self._class, topic, _nothing, qos, raw=True)
-        self._taker = taker_of(self._subscription, MOST_BYTES)
+        self._reader = reader_of(self._subscription, MOST_BYTES)
 
     def taken(self) -> Iterator[RawMessage]:
         """Yield the messages received; one longer than ``MOST_BYTES`` has no payload."""
-        while (found := self._taker.take()) is not None:
+        while (found := self._reader.take()) is not None:
             yield found
 
     def close(self) -> None:

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
-from automax_ros.ros.intake.rcl import OK, TAKE_FAILED, Bytes, Library, MessageInfo, library
+from automax_ros.ros.intake.rcl import OK, TAKE_FAILED, Library, MessageInfo, library
 
 MOST_SENDERS = 64
 """Most senders of a topic that are remembered (decision: a bound); the one known longest is forgotten first."""
@@ -34,28 +34,17 @@ class RawMessage(NamedTuple):
     sender: bytes
 
 
-class RawReader(Protocol):
-    """Takes the messages of one subscription."""
-
-    def take(self) -> RawMessage | None:
-        """Return the next message; None if there is none.
-
-        Raises:
-            InvalidHandle: rclpy's; the subscription was destroyed.
-            RuntimeError: the middleware fails.
-        """
-
-
-def taker_of(subscription: Any, most_bytes: int) -> RawReader:
+def reader_of(subscription: Any, most_bytes: int) -> _RclReader | _RclpyReader:
     """Return the reader of an rclpy subscription; messages longer than ``most_bytes`` have no payload.
 
-    No executor may serve the subscription.
+    Its ``take`` returns the next message, None if there is none. It raises rclpy's InvalidHandle if the subscription
+    was destroyed, RuntimeError if the middleware fails. No executor may serve the subscription.
     """
     found = library()
-    return _RclpyTaker(subscription, most_bytes) if found is None else _RclTaker(found, subscription, most_bytes)
+    return _RclpyReader(subscription, most_bytes) if found is None else _RclReader(found, subscription, most_bytes)
 
 
-class _RclTaker:
+class _RclReader:
     """Reads with rcl itself, without holding the interpreter."""
 
     def __init__(self, rcl: Library, subscription: Any, most_bytes: int) -> None:
@@ -73,16 +62,14 @@ class _RclTaker:
                 return None
             raise RuntimeError(f"rcl_take_serialized_message returns {result}")
         size = buffer.length
-        payload = self._copied(buffer) if size <= self._most_bytes else None
+        payload = None
+        if size <= self._most_bytes:
+            payload = ctypes.string_at(buffer.buffer, size) if buffer.buffer else b""
         rcl.give_back(buffer)
         return RawMessage(payload, size, info.source_timestamp, info.publication_sequence_number, bytes(info.sender))
 
-    @staticmethod
-    def _copied(buffer: Bytes) -> bytes:
-        return ctypes.string_at(buffer.buffer, buffer.length) if buffer.buffer else b""
 
-
-class _RclpyTaker:
+class _RclpyReader:
     """Reads with rclpy, where rcl is not found: a long message holds up all threads while it is copied."""
 
     def __init__(self, subscription: Any, most_bytes: int) -> None:
@@ -105,11 +92,11 @@ class TopicReader:
 
     def __init__(self, subscription: Any, most_bytes: int, receive: Callable[[RawMessage], None]) -> None:
         self.name, self.handle = subscription.topic_name, subscription.handle
-        self._taker, self._receive = taker_of(subscription, most_bytes), receive
+        self._reader, self._receive = reader_of(subscription, most_bytes), receive
 
     def take(self) -> bool:
         """Take the next message; return False if there is none."""
-        taken = self._taker.take()
+        taken = self._reader.take()
         if taken is not None:
             self._receive(taken)
         return taken is not None

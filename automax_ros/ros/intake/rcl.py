@@ -14,7 +14,6 @@ import functools
 import os
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -135,17 +134,11 @@ def _opened(name: str) -> ctypes.CDLL:
         OSError: it is not loaded.
     """
     wanted = re.compile(rf"lib{name}(-[0-9a-f]+)?\.so[0-9.]*")
-    for path in _loaded():
-        if wanted.fullmatch(path.name):
-            return ctypes.CDLL(str(path))
-    raise OSError(f"lib{name} is not loaded")
-
-
-def _loaded() -> Iterator[Path]:
     for line in _MAPS.read_text(encoding="utf-8", errors="replace").splitlines():
         fields = line.split(maxsplit=5)
-        if len(fields) == 6:
-            yield Path(fields[5])
+        if len(fields) == 6 and wanted.fullmatch(Path(fields[5]).name):
+            return ctypes.CDLL(fields[5])
+    raise OSError(f"lib{name} is not loaded")
 
 
 def capsule_pointer(capsule: Any) -> int:

@@ -12,6 +12,7 @@ plant's joint is commanded (``ros/nodes/joint_commands.py``).
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -23,12 +24,11 @@ from automax_ros.messages.types.rack_files import RackFile, files_of, files_text
 from automax_ros.messages.types.topics import LATCHED, Take, Topic
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.rackfile.model.ros_names import set_topic
-from automax_ros.rackfile.model.writers import ROS_WRITER
 from automax_ros.ros.base.node import MAIN_NODE, ModuleNode, RackContext
 from automax_ros.ros.base.qos import ros_qos
 from automax_ros.ros.base.rack_health import RackHealth
-from automax_ros.ros.base.write_topic import ScaledWriter, WriteTopic
-from automax_ros.ros.nodes.joint_commands import joint_inlets
+from automax_ros.ros.base.write_topic import ScaledWriter, subscribe_variable
+from automax_ros.ros.nodes.joint_commands import subscribe_joint
 from automax_ros.runtime.memory.views import MemoryValueError
 
 _NUMBER_BYTES = 8
@@ -50,23 +50,22 @@ class CommonMemoryNode(ModuleNode):
                 outlets[own] = self.outlet(own, stream.send_image if joined else None)
         self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
         self._files: list[RackFile] = []
-        outlets[stream.operations_topic] = self._with_files(outlets[stream.operations_topic])
+        outlets[stream.operations_topic] = partial(self._send_operation, outlets[stream.operations_topic])
         self.offer_files()
         for view, variable in enumerate(rack.config.variables):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
-                _ValueInlet(self, view, variable, topic)
-        joint_inlets(self)
+                _subscribe_values(self, view, variable, topic)
+        for command in rack.config.joint_commands:
+            subscribe_joint(self, command)
         stream.add_sink(outlets.get)
         self.diagnose(RackHealth(site, f"{MAIN_NODE}: {rack.config.name}").statuses)
         self.diagnose(self._module_health)
 
-    def _with_files(self, publish: Take) -> Take:
-        def take(stamp: int, payload: bytes) -> None:
-            self.offer_files()
-            publish(stamp, payload)
-
-        return take
+    def _send_operation(self, publish: Take, stamp: int, payload: bytes) -> None:
+        """Publish an operation, after the files that the rack runs from: a reload has changed them."""
+        self.offer_files()
+        publish(stamp, payload)
 
     def _module_health(self, _: int) -> list[DiagnosticStatus]:
         """Return the health of the module that holds common memory; a lone Processor reports its own."""
@@ -88,32 +87,16 @@ class CommonMemoryNode(ModuleNode):
             self._config.publish(String(data=files_text(rack.config.name, files)))
 
 
-class _ValueInlet:
-    """Receives writes to one variable from ROS."""
+def _subscribe_values(node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
+    name, scale = set_topic(topic.name), variable.scale
+    scaled = None if scale is None else ScaledWriter(node, name, variable, scale, variable.unit)
 
-    def __init__(self, node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
-        self._node, self._view, self._variable = node, view, variable
-        name, scale = set_topic(topic.name), variable.scale
-        self._scaled = None if scale is None else ScaledWriter(node, name, variable, scale, variable.unit)
-        self._inlet = WriteTopic(node, name, topic.type_name, self._write, _most_bytes(variable))
+    def elements_of(message: Any) -> list[tuple[int, Value]]:
+        return _elements(variable, message) if scaled is None else [(0, scaled.counts(message.data))]
 
-    def _write(self, message: Any) -> None:
-        rack, scaled = self._node.site.rack, self._scaled
-        try:
-            if not rack.operations.powered and not rack.config.is_input(self._variable):
-                raise MemoryValueError(f"the power is off, and {self._variable.name} is not an input")
-            values = _elements(self._variable, message) if scaled is None else [(0, scaled.counts(message.data))]
-            rack.write_view(self._view, values, ROS_WRITER)
-        except MemoryValueError as error:
-            self._inlet.refuse(self._variable.name, error)
-
-
-def _most_bytes(variable: CommonVariable) -> int:
-    """Return the greatest length of a message with a whole variable, bytes.
-
-    An element has at most 8, whatever its type, a character 4; an array's layout may contain names.
-    """
-    return _LAYOUT_BYTES * variable.is_array + variable.elements * (_NUMBER_BYTES + 4 * variable.length)
+    # An element has at most 8 bytes, whatever its type, a character 4; an array's layout may contain names.
+    most_bytes = _LAYOUT_BYTES * variable.is_array + variable.elements * (_NUMBER_BYTES + 4 * variable.length)
+    subscribe_variable(node, name, topic.type_name, view, elements_of, most_bytes)
 
 
 def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:

@@ -16,7 +16,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rackfile.model.driven import DrivenPlant
@@ -38,14 +37,12 @@ class DrivePlantNode(ModuleNode):
         self._timing = module.timing if isinstance(module, Timed) else None
         self._controls = SwitchOperations(site.rack)
         if driven.config.load.from_ros:
-            self._inlet = WriteTopic(self, load_topic(driven.name), "std_msgs/msg/Float64", self._load, 8)
+            target = f"the load of {driven.name}"
+            WriteTopic(self, load_topic(driven.name), "std_msgs/msg/Float64", self._load, 8, target)
         self.diagnose(self._health)
 
     def _load(self, message: Any) -> None:
-        try:
-            self._controls.load(self._driven.name, message.data)
-        except OperationRefused as refused:
-            self._inlet.refuse(f"the load of {self._driven.name}", refused)
+        self._controls.load(self._driven.name, message.data)
 
     def _health(self, _: int) -> list[DiagnosticStatus]:
         """Return the plant's health: WARN with a fault, or with late firings since the last report; else OK."""

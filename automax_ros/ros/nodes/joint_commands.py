@@ -11,13 +11,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from automax_ros.rackfile.model.config import CommonVariable
+from automax_ros.core.types import Value
 from automax_ros.rackfile.model.plants import JointCommand
 from automax_ros.rackfile.model.ros_names import command_topic
-from automax_ros.rackfile.model.writers import ROS_WRITER
 from automax_ros.rackfile.sections.joint_keys import INTERFACES, UNITS
 from automax_ros.ros.base.node import ModuleNode
-from automax_ros.ros.base.write_topic import ScaledWriter, WriteTopic
+from automax_ros.ros.base.write_topic import ScaledWriter, subscribe_variable
 from automax_ros.runtime.memory.views import MemoryValueError
 
 TYPE = "std_msgs/msg/Float64MultiArray"
@@ -25,37 +24,20 @@ MOST_BYTES = 1024
 """Longest message that is read, bytes: one number, and a layout with its names (decision)."""
 
 
-class JointInlet:
-    """Receives the commands of one joint by one interface."""
+def subscribe_joint(node: ModuleNode, command: JointCommand) -> None:
+    """Subscribe a node to the commands of one joint by one interface."""
+    config, interface = node.site.rack.config, command.interface
+    view = next(view for view, variable in enumerate(config.variables) if variable.name == command.common)
+    topic = f"/{config.namespace}/{command_topic(command.joint, interface)}"
+    scaled = None
+    if command.scale:
+        scaled = ScaledWriter(node, topic, config.variables[view], command.scale, UNITS[interface])
 
-    def __init__(self, node: ModuleNode, command: JointCommand) -> None:
-        self._node, self._command = node, command
-        variables = node.site.rack.config.variables
-        self._view, self._variable = _place(variables, command.common)
-        topic = f"/{node.site.rack.config.namespace}/{command_topic(command.joint, command.interface)}"
-        unit = UNITS[command.interface]
-        self._scaled = ScaledWriter(node, topic, self._variable, command.scale, unit) if command.scale else None
-        self._inlet = WriteTopic(node, topic, TYPE, self._write, MOST_BYTES)
+    def elements_of(message: Any) -> list[tuple[int, Value]]:
+        if len(message.data) != 1:
+            joint = f"{interface} of {command.joint}"
+            raise MemoryValueError(f"{joint} is one number, the message has {len(message.data)}")
+        value = message.data[0] / INTERFACES[interface]
+        return [(0, value if scaled is None else scaled.counts(value))]
 
-    def _write(self, message: Any) -> None:
-        rack, variable = self._node.site.rack, self._variable
-        try:
-            if not rack.operations.powered and not rack.config.is_input(variable):
-                raise MemoryValueError(f"the power is off, and {variable.name} is not an input")
-            if len(message.data) != 1:
-                joint = f"{self._command.interface} of {self._command.joint}"
-                raise MemoryValueError(f"{joint} is one number, the message has {len(message.data)}")
-            value = message.data[0] / INTERFACES[self._command.interface]
-            number = value if self._scaled is None else self._scaled.counts(value)
-            rack.write_view(self._view, [(0, number)], ROS_WRITER)
-        except MemoryValueError as error:
-            self._inlet.refuse(variable.name, error)
-
-
-def joint_inlets(node: ModuleNode) -> list[JointInlet]:
-    """Subscribe a node to the commands of all joints of the rack."""
-    return [JointInlet(node, command) for command in node.site.rack.config.joint_commands]
-
-
-def _place(variables: tuple[CommonVariable, ...], name: str) -> tuple[int, CommonVariable]:
-    return next((view, variable) for view, variable in enumerate(variables) if variable.name == name)
+    subscribe_variable(node, topic, TYPE, view, elements_of, MOST_BYTES)

@@ -23,7 +23,6 @@ from typing import Protocol
 from rclpy.context import Context
 
 from automax_ros.rack.base.observers import Operation
-from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.ros.base.lifecycle import (
     ACTIVATE,
@@ -32,7 +31,6 @@ from automax_ros.ros.base.lifecycle import (
     LifecycleCallbacks,
     LifecycleNode,
     Pending,
-    TransitionRefused,
 )
 from automax_ros.ros.base.module_lifecycle import NOT_OPERATED
 from automax_ros.ros.base.node import MAIN_NODE, RackRosNode
@@ -80,17 +78,11 @@ class RackLifecycle:
 
     def activate(self) -> Pending | None:
         """Put all stopped tasks into RUN."""
-        try:
-            return self._held.activate()
-        except OperationRefused as refused:
-            raise TransitionRefused(str(refused)) from refused
+        return self._held.activate()
 
     def deactivate(self) -> None:
         """STOP ALL."""
-        try:
-            self._held.deactivate()
-        except OperationRefused as refused:
-            raise TransitionRefused(str(refused)) from refused
+        self._held.deactivate()
 
     def configure(self) -> None:
         """Do nothing: the rack is configured already."""

@@ -13,12 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Protocol
 
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.ros.base.node import MAIN_NODE, SIM_TIME
-from automax_ros.ros.nodes.tunables import TunableParameters
+from automax_ros.ros.nodes.processor import ProcessorNode
 from automax_ros.ros.setup.arguments import RosArguments
 from automax_ros.ros.setup.parameter_files import GivenParameter, RosArgumentsError
 
@@ -29,15 +28,7 @@ _OWN_OF_ROS = (SIM_TIME, "start_type_description_service", "qos_overrides.")
 """Parameters that rclpy declares, or may."""
 
 
-class Tuned(Protocol):
-    """A node whose parameters are tunables."""
-
-    own_name: str
-    """Its name in the rack, before remapping."""
-    tunables: TunableParameters
-
-
-def tune_at_start(arguments: RosArguments, namespace: str, nodes: Iterable[Tuned]) -> None:
+def tune_at_start(arguments: RosArguments, namespace: str, nodes: Iterable[ProcessorNode]) -> None:
     """Set tunables to the values of the command line.
 
     Raises:
@@ -60,42 +51,28 @@ def without_use(arguments: RosArguments, config: RackConfig, declared: Mapping[s
         config: the rack's configuration.
         declared: the parameters of each node in this process, by its own name; other processes may have more nodes.
     """
-    told: dict[tuple[str, str], str] = {}
+    names = {MAIN_NODE, *declared, *(module.name for module in config.modules)}  # other processes' included
+    found: dict[tuple[str, str], str] = {}
     for item in arguments.parameters:
-        if item.name == SIM_TIME and item.value is True and not _reaches_rack(item, arguments, config):
-            told[item.key, item.name] = f"{item.place}: {_ONE_TIME}"
+        only = replace(arguments, parameters=(item,))
+        reached = {name for name in names if only.given_to(name, config.namespace, main=name == MAIN_NODE)}
+        if item.name == SIM_TIME and item.value is True and MAIN_NODE not in reached:
+            found[item.key, item.name] = f"{item.place}: {_ONE_TIME}"
         if item.name.startswith(_OWN_OF_ROS):
             continue
-        reached = _reached(item, arguments, config, declared)
         if not reached:
-            told.setdefault((item.key, ""), _without_node(item, config, declared))
+            found.setdefault((item.key, ""), _without_node(item, config, names))
         elif not reached - {MAIN_NODE} - set(declared):
-            told[item.key, item.name] = _without_name(item, reached, declared)
-    texts = [text for text in told.values() if text]
+            found[item.key, item.name] = _without_name(item, reached, declared)
+    texts = [text for text in found.values() if text]
     more = [f"{len(texts) - MOST_TOLD} more parameters reach nobody"] if texts[MOST_TOLD:] else []
     return [*texts[:MOST_TOLD], *more]
 
 
-def _reaches_rack(item: GivenParameter, arguments: RosArguments, config: RackConfig) -> bool:
-    only = replace(arguments, parameters=(item,))
-    return bool(only.given_to(MAIN_NODE, config.namespace, main=True))
-
-
-def _names(config: RackConfig, declared: Mapping[str, Iterable[str]]) -> set[str]:
-    return {MAIN_NODE, *declared, *(module.name for module in config.modules)}
-
-
-def _reached(
-    item: GivenParameter, arguments: RosArguments, config: RackConfig, declared: Mapping[str, Iterable[str]]
-) -> set[str]:
-    only = replace(arguments, parameters=(item,))
-    return {name for name in _names(config, declared) if only.given_to(name, config.namespace, main=name == MAIN_NODE)}
-
-
-def _without_node(item: GivenParameter, config: RackConfig, declared: Mapping[str, Iterable[str]]) -> str:
+def _without_node(item: GivenParameter, config: RackConfig, names: Iterable[str]) -> str:
     """Return the message about a key that no node has; "" if it may be for another program."""
     space = f"/{config.namespace}/" if item.key.startswith("/") else ""
-    known = [f"{space}{name}" for name in sorted(_names(config, declared))]
+    known = [f"{space}{name}" for name in sorted(names)]
     hint = did_you_mean(item.key, known)
     if item.is_for_all and hint is None:
         return ""
