@@ -1,6 +1,10 @@
-"""What tests of live nodes share: a client in the graph."""
+"""What tests of live nodes share: a client in the graph, a live rack, its services."""
 
 import pytest
+
+from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
+from ros.support import until
 
 
 @pytest.fixture
@@ -20,3 +24,37 @@ def context(ros_domain_id):
     made.init(args=[])
     yield made
     made.try_shutdown()
+
+
+@pytest.fixture
+def live(request, ros_domain_id, tmp_path):
+    """The rack of a test file, live: of its CONFIG, a path, or of its RACK and SOURCES, texts."""
+    from automax_ros.ros.rack_nodes import LiveRack
+
+    config = getattr(request.module, "CONFIG", tmp_path / "rack.yaml")
+    for name, text in getattr(request.module, "SOURCES", {}).items():
+        (tmp_path / f"{name}.BLK").write_text(text)
+    if hasattr(request.module, "RACK"):
+        config.write_text(request.module.RACK)
+    made = LiveRack(Rack(load(config).config))
+    made.start([])
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def ask(live, client):
+    """Calls a service of the live rack, and returns the response."""
+    from std_srvs.srv import Trigger
+
+    clients = {}
+
+    def ask(service, kind=Trigger, **fields):
+        if service not in clients:
+            clients[service] = client.node.create_client(kind, f"/{live.rack.config.namespace}/{service}")
+            until(live, client, clients[service].service_is_ready)
+        future = clients[service].call_async(kind.Request(**fields))
+        until(live, client, future.done)
+        return future.result()
+
+    return ask

@@ -28,14 +28,14 @@ from automax_ros.runtime.time.simulated_pacer import SimulatedPacer, SimulatedTi
 
 CLOCK = "/clock"
 _TYPE = "rosgraph_msgs/msg/Clock"
-_TOLD = QosProfile("reliable", "volatile", "keep_last", 10)
-_HEARD = QosProfile("best_effort", "volatile", "keep_last", 1000)
+_PUBLISHED = QosProfile("reliable", "volatile", "keep_last", 10)
+_FOLLOWED = QosProfile("best_effort", "volatile", "keep_last", 1000)
 """Matches reliable and best-effort publishers of ``/clock``; its depth is what waits while the rack is busy."""
 _MOST_BYTES = 64
 _LATEST_NS = ((1 << 31) - 366 * 24 * 3600) * NS_PER_S
 """The time stamps of ROS end in 2038: a clock with less than a year left until then is refused (decision)."""
 _WAIT_S = 0.05
-_LOOK_INTERVAL_S = 1.0
+_CHECK_INTERVAL_S = 1.0
 """Seconds between two checks for other publishers of ``/clock``."""
 JUMP = "clock jump"
 TAKEN = "other /clock"
@@ -46,23 +46,21 @@ MALFORMED = "malformed /clock"
 class RackClock:
     """Creates the pacer of one rack and connects it to ``/clock``."""
 
-    def __init__(
-        self, scheduler: Scheduler, turns: RackLock, *, follows: bool, simulated: SimulatedTime | None
-    ) -> None:
+    def __init__(self, scheduler: Scheduler, lock: RackLock, *, follows: bool, simulated: SimulatedTime | None) -> None:
         self._site: RackContext | None = None
         self._node: ModuleNode | None = None
         self._topic = CLOCK
-        self._publish: Callable[[bytes], object] = _unsent
+        self._publish: Callable[[bytes], object] = _not_published
         self._encode = encoder(_TYPE)
-        self._throttle, self._telling = Throttle(_LOOK_INTERVAL_S), Throttle(_LOOK_INTERVAL_S)
+        self._throttle, self._log_throttle = Throttle(_CHECK_INTERVAL_S), Throttle(_CHECK_INTERVAL_S)
         self._follower: FollowingPacer | None = None
         self.pace: Pace
         if simulated is not None:
-            self.pace = SimulatedPacer(scheduler, self._tell, rate=simulated.rate, turn=turns.for_scan)
+            self.pace = SimulatedPacer(scheduler, self._publish_time, rate=simulated.rate, turn=lock.for_scan)
         elif follows:
-            self.pace = self._follower = FollowingPacer(scheduler, self._jumped, turn=turns.for_scan)
+            self.pace = self._follower = FollowingPacer(scheduler, self._jumped, turn=lock.for_scan)
         else:
-            self.pace = Pacer(scheduler, turn=turns.for_scan)
+            self.pace = Pacer(scheduler, turn=lock.for_scan)
 
     @property
     def is_there(self) -> bool:
@@ -73,12 +71,14 @@ class RackClock:
         """Publish ``/clock`` or subscribe to it, by a node of the rack."""
         self._site, self._node = site, node
         if isinstance(self.pace, SimulatedPacer):
-            publisher = node.create_publisher(message_class(_TYPE), CLOCK, ros_qos(_TOLD))
+            publisher = node.create_publisher(message_class(_TYPE), CLOCK, ros_qos(_PUBLISHED))
             self._publish, self._topic = publisher.publish, publisher.topic_name
         elif self._follower is not None:
-            subscription = node.own_subscription(message_class(_TYPE), CLOCK, ros_qos(_HEARD))
+            subscription = node.own_subscription(message_class(_TYPE), CLOCK, ros_qos(_FOLLOWED))
             self._topic = subscription.topic_name
-            site.intake.add(TopicReader(subscription, _MOST_BYTES, lambda taken: self._hear(taken.payload)), last=True)
+            site.intake.add(
+                TopicReader(subscription, _MOST_BYTES, lambda taken: self._receive(taken.payload)), last=True
+            )
 
     def wait(self, should_stop: Callable[[], bool], on_idle: Callable[[int], None] | None = None) -> bool:
         """Wait until the rack can start; return False if asked to stop. ``on_idle`` gets rack time meanwhile, 0."""
@@ -90,12 +90,12 @@ class RackClock:
             time.sleep(_WAIT_S)
         return True
 
-    def _tell(self, now_ns: int) -> None:
+    def _publish_time(self, now_ns: int) -> None:
         assert self._site is not None
         self._publish(self._encode(Clock(self._site.stream.stamp(now_ns))))
-        self._look_around(own=1)
+        self._check_publishers(own=1)
 
-    def _hear(self, payload: bytes | None) -> None:
+    def _receive(self, payload: bytes | None) -> None:
         assert self._site is not None
         try:
             message = decode(_TYPE, payload or b"")
@@ -107,7 +107,7 @@ class RackClock:
             text = f"{CLOCK}: {error}"
             self._site.health.note(MALFORMED, CLOCK, lambda: text)
             return
-        self._look_around(own=0)
+        self._check_publishers(own=0)
 
     def _follow(self, clock_ns: int) -> None:
         """Follow ``/clock`` to a time.
@@ -123,7 +123,7 @@ class RackClock:
                 raise CdrError(f"{clock_ns} ns comes after a clock that went back, and would be a stamp of {stamp} ns")
             self._follower.heard(clock_ns)
 
-    def _look_around(self, own: int) -> None:
+    def _check_publishers(self, own: int) -> None:
         assert self._node is not None
         assert self._site is not None
         if self._throttle.passes() and self._node.count_publishers(self._topic) > 1:
@@ -141,9 +141,9 @@ class RackClock:
         else:
             text = f"/clock went back by {-by_ns / NS_PER_S:.9g} s: rack time and stamps go on from where they are"
         self._site.health.note(JUMP, by_ns > 0, lambda: text)
-        if self._telling.passes():
+        if self._log_throttle.passes():
             self._node.get_logger().warning(text)
 
 
-def _unsent(_: bytes) -> None:
+def _not_published(_: bytes) -> None:
     """Publish nothing: the rack has no node yet."""

@@ -47,10 +47,10 @@ class Diagnostics:
         self._levels: dict[str, bytes] = {}
         self._counts: dict[str, int] = {}
         self._sent_counts: dict[str, int] = {}
-        self._next_look_ns = 0
+        self._next_check_ns = 0
         self._pending: ScheduledEvent | None = None
         self._changed = False
-        self._halted_period, self._halted_look = Throttle(PERIOD_NS / NS_PER_S), Throttle(SHORTEST_NS / NS_PER_S)
+        self._halted_period, self._halted_check = Throttle(PERIOD_NS / NS_PER_S), Throttle(SHORTEST_NS / NS_PER_S)
         self._publisher: Any = None
 
     @property
@@ -80,8 +80,8 @@ class Diagnostics:
         """Publish at the next opportunity if a level has changed."""
         self._changed = True
         if self._pending is None and not is_halted(self._pace):
-            at_ns = max(self._rack.now_ns, self._next_look_ns)
-            self._pending = self._rack.scheduler.at(at_ns, _KEY, self._look_at)
+            at_ns = max(self._rack.now_ns, self._next_check_ns)
+            self._pending = self._rack.scheduler.at(at_ns, _KEY, self._check_at)
 
     # RackObserver
 
@@ -104,11 +104,11 @@ class Diagnostics:
         self._send(self._statuses(now_ns), now_ns)
         self._sent_counts = dict(self._counts)
 
-    def _look_at(self, now_ns: int) -> None:
+    def _check_at(self, now_ns: int) -> None:
         self._pending = None
-        self._next_look_ns = now_ns + (SHORTEST_NS if self._look(now_ns) else LOOK_NS)
+        self._next_check_ns = now_ns + (SHORTEST_NS if self._check(now_ns) else LOOK_NS)
 
-    def _look(self, now_ns: int) -> bool:
+    def _check(self, now_ns: int) -> bool:
         self._changed = False
         statuses = self._statuses(now_ns)
         if {item.name: item.level for item in statuses} == self._levels:
@@ -121,8 +121,8 @@ class Diagnostics:
         if self._halted_period.passes():
             self._changed = False
             self._report(now)
-        elif self._changed and self._halted_look.passes():
-            self._look(now)
+        elif self._changed and self._halted_check.passes():
+            self._check(now)
 
     def _statuses(self, now_ns: int) -> list[DiagnosticStatus]:
         return [status for source in self._sources for status in source(now_ns)]

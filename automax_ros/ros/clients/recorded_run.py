@@ -81,8 +81,8 @@ class RecordedRun:
         self._last_ns = self._next_ns = 0
         self._has_rival = False
         self._tables: dict[bytes, RawMessage] = {}
-        self._strangers: dict[bytes, UnknownPublisher] = {}
-        self._told: set[str] = set()
+        self._unknown: dict[bytes, UnknownPublisher] = {}
+        self._reported: set[str] = set()
         self.news: list[str] = []
         self.tells_senders = library() is not None
 
@@ -98,7 +98,7 @@ class RecordedRun:
         """Accept another process of the same run."""
         if len(self._others) < MOST_PROCESSES:
             self._others.add(participant(sender))
-            self._strangers.pop(participant(sender), None)
+            self._unknown.pop(participant(sender), None)
 
     @property
     def is_there(self) -> bool:
@@ -117,23 +117,23 @@ class RecordedRun:
         if sender == self._home or sender in self._others:
             self._last_ns = time.monotonic_ns()
             return True
-        if sender not in self._strangers and len(self._strangers) >= MOST_PROCESSES:
+        if sender not in self._unknown and len(self._unknown) >= MOST_PROCESSES:
             sender = b""
-        self._strangers.setdefault(sender, UnknownPublisher(time.monotonic_ns())).sent[topic] += 1
+        self._unknown.setdefault(sender, UnknownPublisher(time.monotonic_ns())).sent[topic] += 1
         return False
 
     @property
     def refused(self) -> int:
         """Number of messages of other programs that were discarded."""
-        return sum(stranger.sent.total() for stranger in self._strangers.values())
+        return sum(publisher.sent.total() for publisher in self._unknown.values())
 
     def look(self) -> None:
         """Report programs that publish on the rack's topics but are not processes of the rack."""
         now = time.monotonic_ns()
-        for stranger in self._strangers.values():
-            if now - stranger.since_ns > GRACE_NS:
-                for topic in stranger.sent.keys() - self._told:
-                    self._told.add(topic)
+        for publisher in self._unknown.values():
+            if now - publisher.since_ns > GRACE_NS:
+                for topic in publisher.sent.keys() - self._reported:
+                    self._reported.add(topic)
                     self.news.append(
                         f"left out what another program publishes on {topic}: it is not of the recorded rack"
                     )

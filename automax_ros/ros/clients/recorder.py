@@ -4,10 +4,6 @@ Subscribes to the rack's ``variables``, ``config``, ``backplane``, ``backplane/s
 the topics of all common variables; publishes nothing. Messages are taken as bytes, by polling all topics every 25 ms:
 that costs a fraction of one callback each, and one poll shows how far all topics have come. Each message carries the
 time at which it was sent, which gives the order of the rack's own log.
-
-``RecorderWait`` waits, in a process of a distributed rack, for a recorder that will receive all of its messages. It
-looks for the recorder's subscriptions in the graph: a reliable writer that is matched with a reader before its first
-message delivers all messages to it.
 """
 
 from __future__ import annotations
@@ -36,16 +32,12 @@ from automax_ros.recordings.live.arrival import SendOrder
 from automax_ros.recordings.live.recording import LiveRecording
 from automax_ros.recordings.live.topics import LiveTopics, TopicKind
 from automax_ros.recordings.write.data_file import StorageOptions
-from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class
 from automax_ros.ros.clients.recorded_run import MOST_TABLES, RecordedRun, participant
+from automax_ros.ros.distributed.recorder_wait import recorder_name
 from automax_ros.ros.intake.raw_messages import RawMessage, reader_of
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.process import joined_context
-
-_LOOK_NS = 100 * NS_PER_MS
-"""Time between two checks (decision): the graph is queried for each topic."""
-
 
 LOOK_S = 0.025
 """Seconds between two polls of the topics."""
@@ -57,46 +49,17 @@ READER_DEPTH = 10_000
 """Messages of one topic that wait in this process when it is held up."""
 FILES_WAIT_NS = 3 * NS_PER_S
 """How long to wait for a rack's files once its table has arrived."""
-_KNOCK_NS = NS_PER_S
-_SLOW_KNOCK_NS = 10 * _KNOCK_NS
-_MOST_KNOCKS = 5
+_REQUEST_NS = NS_PER_S
+_SLOW_REQUEST_NS = 10 * _REQUEST_NS
+_MOST_REQUESTS = 5
 """Number of requests at intervals of one second; later ones are sent every ten seconds."""
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _FILES = TopicKind("std_msgs/msg/String", LATCHED)
 _PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
 
 
-class RecorderWait:
-    """Checks whether a recorder has subscribed to the topics of one process."""
-
-    def __init__(self, site: RackContext, node: ModuleNode, *others: str) -> None:
-        self._node = node
-        self._space, self._name = f"/{site.rack.config.namespace}", recorder_name(site.arguments)
-        recorded = LiveTopics.expected(self._space, site.rack.config).all
-        sent = [topic.name for topic in site.stream.topics if topic.name in recorded]
-        self._unheard = [*dict.fromkeys(sent), *(f"{self._space}/{topic}" for topic in others)]
-        self._next_ns = 0
-
-    def is_over(self) -> bool:
-        """Return whether the recorder has subscribed to all of them."""
-        now = time.monotonic_ns()
-        if self._unheard and now >= self._next_ns:
-            self._next_ns = now + _LOOK_NS
-            self._unheard = [topic for topic in self._unheard if not self._is_heard(topic)]
-        return not self._unheard
-
-    def _is_heard(self, topic: str) -> bool:
-        readers = self._node.get_subscriptions_info_by_topic(topic)
-        return any(item.node_name == self._name and item.node_namespace == self._space for item in readers)
-
-
 class SeveralRacks(UserError):
     """Several racks have the same name in this ROS domain."""
-
-
-def recorder_name(arguments: RosArguments) -> str:
-    """Return the name of the node ``recorder`` in a process with these arguments."""
-    return arguments.name_of("recorder", main=True)
 
 
 class RawSubscription:
@@ -169,9 +132,9 @@ class LiveRecorder:
         self._files: RawSubscription | None = None
         self._numbers: dict[str, int] = {}
         self._last_due = 0
-        self._knocks: list[RawSubscription] = []
-        self._next_knock = 0
-        self._knock_count = 0
+        self._requests: list[RawSubscription] = []
+        self._next_request = 0
+        self._request_count = 0
         self._files_begun = 1
         self.binding = RecordedRun(self._node, space)
         self._presences: RawSubscription | None = None
@@ -194,7 +157,7 @@ class LiveRecorder:
         """
         topics = LiveTopics.expected(self._space, config)
         kinds = topics.all
-        self._hear_processes()
+        self._subscribe_presences()
         self._files = RawSubscription(self._node, topics.config, _FILES)
         self._early = {name: RawSubscription(self._node, name, kinds[name]) for name in topics.in_order}
 
@@ -219,21 +182,21 @@ class LiveRecorder:
                 if len(racks) > 1:
                     raise SeveralRacks(f"{len(racks)} racks are called {self._space}", "stop one of them")
                 for rack in racks & tables.keys():
-                    return self._bound_to(tables[rack])
+                    return self._bind(tables[rack])
                 time.sleep(LOOK_S)
         finally:
             source.close()
         return None
 
-    def _bound_to(self, found: RawMessage) -> VariableTable:
+    def _bind(self, found: RawMessage) -> VariableTable:
         self.binding.bind(found.sender)
         self._table = found.payload or b""
         table = table_of(self._table)
         self._run_id = table.run_id
-        self._hear_processes()
+        self._subscribe_presences()
         return table
 
-    def _hear_processes(self) -> None:
+    def _subscribe_presences(self) -> None:
         if self._presences is None:
             self._presences = RawSubscription(self._node, f"{self._space}/bus/presence", _PRESENCE)
 
@@ -284,8 +247,8 @@ class LiveRecorder:
         """Take the messages received and record those that are due."""
         assert self.recording is not None
         now = time.monotonic_ns()
-        self._look()
-        self._look_at_files()
+        self._poll()
+        self._poll_files()
         due = self._order.due(now)
         for sent_ns, (topic, payload) in due:
             self.recording.take(topic, sent_ns, payload)
@@ -293,7 +256,7 @@ class LiveRecorder:
             self._last_due = now
         elif now - self._last_due > HOLD_NS:
             self.recording.flush(now - self._last_due)
-        if now >= self._next_knock or self.recording.files_begun > self._files_begun:
+        if now >= self._next_request or self.recording.files_begun > self._files_begun:
             self._files_begun = self.recording.files_begun
             self._request_image(now)
 
@@ -301,8 +264,8 @@ class LiveRecorder:
         """Take and record the remaining messages, and finish the bag; a disk error is the recording's failure."""
         if self.recording is None:
             return
-        self._look()
-        self._look_at_files()
+        self._poll()
+        self._poll_files()
         for sent_ns, (topic, payload) in self._order.rest():
             self.recording.take(topic, sent_ns, payload)
         self.recording.close()
@@ -312,8 +275,8 @@ class LiveRecorder:
         self._node.destroy_node()
         self._context.try_shutdown()
 
-    def _look(self) -> None:
-        self._meet_processes()
+    def _poll(self) -> None:
+        self._poll_presences()
         self.binding.look()
         table = self.binding.successor()
         if table is not None:
@@ -333,7 +296,7 @@ class LiveRecorder:
             elif topic == self._topics.variables:
                 binding.keep(found)
 
-    def _meet_processes(self) -> None:
+    def _poll_presences(self) -> None:
         if self._presences is None:
             return
         for found in self._presences.taken():
@@ -342,7 +305,7 @@ class LiveRecorder:
                 if isinstance(presence, Presence) and presence.run_id == self._run_id:
                     self.binding.admit(found.sender)
 
-    def _look_at_files(self) -> None:
+    def _poll_files(self) -> None:
         """Store the source of a task that was reloaded meanwhile: the rack publishes its files again then."""
         assert self._files is not None
         assert self.recording is not None
@@ -363,18 +326,18 @@ class LiveRecorder:
     def _request_image(self, now: int) -> None:
         """Request the data that recording still needs; the rack sends it again to every new subscriber."""
         assert self.recording is not None
-        for knock in self._knocks:
-            knock.close()
-        self._knocks.clear()
-        self._next_knock = now + (_KNOCK_NS if self._knock_count < _MOST_KNOCKS else _SLOW_KNOCK_NS)
+        for request in self._requests:
+            request.close()
+        self._requests.clear()
+        self._next_request = now + (_REQUEST_NS if self._request_count < _MOST_REQUESTS else _SLOW_REQUEST_NS)
         wanted = [self._topics.snapshot] if self.recording.wants_image else []
         wanted += [self._topics.states] if self.recording.wants_states else []
         if not wanted:
-            self._knock_count = 0
+            self._request_count = 0
         else:
-            self._knock_count += 1
+            self._request_count += 1
             kinds = self._topics.all
-            self._knocks = [RawSubscription(self._node, name, kinds[name]) for name in wanted]
+            self._requests = [RawSubscription(self._node, name, kinds[name]) for name in wanted]
 
 
 def _files(payload: bytes) -> list[RackFile]:

@@ -47,9 +47,9 @@ from automax_ros.rackfile.model.driven import driven_plants
 from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import ros_qos
-from automax_ros.ros.clients.recorder import RecorderWait
 from automax_ros.ros.distributed.bus_topics import BusTopic, Terms
 from automax_ros.ros.distributed.process_watch import ProcessWatch, this_host
+from automax_ros.ros.distributed.recorder_wait import RecorderWait
 from automax_ros.runtime.health import FROM_STRANGERS
 
 LEASE_NS = 100 * NS_PER_MS
@@ -124,17 +124,18 @@ class DistributedMemory:
         self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
         self._begun = self._has_image = False
         self._waiting: list[Callable[[], None]] = []
-        self._answered: dict[int, int] = {}
+        self._last_sent: dict[int, int] = {}
         self._participants: dict[int, bytes] = {}
         self._since_ns = time.monotonic_ns()
         qos = ros_qos(BUS)
         self._writes = node.create_publisher(BusWriteClass, "bus", qos)
         self._images = node.create_publisher(BusImageClass, "bus/image", qos)
         self._presences = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
-        words = Terms(MOST_BYTES // 100, then=self._look_for_missing)
-        self._way = self._hear("bus", qos, BusWrite, self._take_write, Terms(MOST_BYTES // 100, BATCHES_A_ROUND))
-        self._hear("bus/image", qos, BusImage, self._take_image, Terms(MOST_BYTES))
-        self._hear(PRESENCE, presence_qos(), Presence, self._take_presence, words)
+        writes = Terms(MOST_BYTES // 100, BATCHES_A_ROUND)
+        terms = Terms(MOST_BYTES // 100, then=self._take_missing)
+        self._write_topic = self._subscribe("bus", qos, BusWrite, self._take_write, writes)
+        self._subscribe("bus/image", qos, BusImage, self._take_image, Terms(MOST_BYTES))
+        self._subscribe(PRESENCE, presence_qos(), Presence, self._take_presence, terms)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(BEAT_NS / NS_PER_S, node.guarded_callback("the bus", self._beat), clock=steady)
 
@@ -180,7 +181,7 @@ class DistributedMemory:
         """Announce that this process ends normally."""
         self.link.take_waiting()
         self.stage = Stage.LEAVING
-        self._guarded(self._tell)
+        self._guarded(self._publish_presence)
         self._watch.close()
 
     # outgoing messages
@@ -188,7 +189,7 @@ class DistributedMemory:
     def _send(self, batch: Batch) -> None:
         self._writes.publish(encode(write_message(batch, self.run_id, self.peers.process)))
 
-    def _tell(self, asks: int = 0) -> None:
+    def _publish_presence(self, asks: int = 0) -> None:
         peers = self.peers
         presence = Presence(
             time.time_ns(),
@@ -206,15 +207,15 @@ class DistributedMemory:
         presence = presence._replace(host=this_host(), pid=os.getpid())
         self._presences.publish(encode(with_standing(presence, self.link.standing)))
 
-    def _answer(self, asked_by: int) -> None:
+    def _send_image(self, asked_by: int) -> None:
         now = time.monotonic_ns()
-        if not self._begun or now - self._answered.get(asked_by, -ANSWER_NS) < ANSWER_NS:
+        if not self._begun or now - self._last_sent.get(asked_by, -ANSWER_NS) < ANSWER_NS:
             return
-        self._answered = {process: at for process, at in self._answered.items() if now - at < ANSWER_NS}
-        self._answered[asked_by] = now
-        self._show(self.link.picture(), asked_by)
+        self._last_sent = {process: at for process, at in self._last_sent.items() if now - at < ANSWER_NS}
+        self._last_sent[asked_by] = now
+        self._publish_image(self.link.picture(), asked_by)
 
-    def _show(self, picture: ImageCopy, asked_by: int) -> None:
+    def _publish_image(self, picture: ImageCopy, asked_by: int) -> None:
         message = image_message(picture, self._rack.now_ns, self.run_id, self.peers.process, asked_by)
         self._images.publish(encode(message))
 
@@ -226,7 +227,7 @@ class DistributedMemory:
             self._lost(peer)
         if self.stage in (Stage.JOINING, Stage.READY):
             self._advance(now)
-        self._tell(self._asks())
+        self._publish_presence(self._process_to_request())
 
     def _advance(self, now: int) -> None:
         peers = self.peers
@@ -254,7 +255,7 @@ class DistributedMemory:
                 peers.epoch_ns = time.time_ns() + self._lead_ns
                 self.stage = Stage.RUNNING
 
-    def _asks(self) -> int:
+    def _process_to_request(self) -> int:
         """Return the process to request an image from, 0 for none."""
         running = next(self.peers.running(), None)
         # A process that is ready, but learned of the start too late, joins as a later one does.
@@ -271,7 +272,7 @@ class DistributedMemory:
         self._site.health.note("lost process", (name, peer.process), lambda: text)
         self._node.get_logger().error(text)
         if self._begun:
-            self._show(self.link.last_of(peer.presence.seat), FOR_ALL)
+            self._publish_image(self.link.last_of(peer.presence.seat), FOR_ALL)
         operations = self._rack.operations
         stops = self._rack.config.on_module_loss is ModuleLoss.STOP_ALL
         if stops and self._begun and operations.powered and operations.stopped is None:
@@ -279,7 +280,7 @@ class DistributedMemory:
 
     # incoming messages
 
-    def _hear(
+    def _subscribe(
         self, topic: str, qos: QoSProfile, kind: Any, receive: Callable[[Any, bytes], None], terms: Terms
     ) -> BusTopic:
         return BusTopic(self._node, topic, f"automax_msgs/msg/{kind.__name__}", qos, receive, self._refuse, terms)
@@ -324,8 +325,8 @@ class DistributedMemory:
             self._has_image = True
         self._when_begun(lambda: self.link.merge(picture))
 
-    def _latest_ns(self, told_epoch_ns: int = 0) -> int:
-        epoch_ns = self.peers.epoch_ns or told_epoch_ns
+    def _latest_ns(self, given_epoch_ns: int = 0) -> int:
+        epoch_ns = self.peers.epoch_ns or given_epoch_ns
         passed_ns = time.time_ns() - epoch_ns if epoch_ns else LONGEST_RUN_NS
         return max(self._rack.now_ns, passed_ns) + AHEAD_NS
 
@@ -348,27 +349,27 @@ class DistributedMemory:
         if found is PresenceVerdict.OWN:
             return
         if found not in (PresenceVerdict.KNOWN, PresenceVerdict.NEW):
-            self._strange(found, presence)
+            self._report_stranger(found, presence)
             return
         if found is PresenceVerdict.NEW:
             self._participants[presence.process] = sender
         if presence.asks == self.peers.process:
-            self._answer(presence.process)
+            self._send_image(presence.process)
         if self._begun and presence.run_id == self.run_id:
             self.link.adopt(standing_of(presence))
 
-    def _look_for_missing(self, presence: Presence) -> None:
+    def _take_missing(self, presence: Presence) -> None:
         """Take the batches that wait on the bus, before those that a presence announced count as missing.
 
         On a busy host they only wait here, and requesting an image each time would make it busier.
         """
         with self._site.lock:
             is_short = self.peers.is_short(presence)
-        if is_short and not all(self._way.take() for _ in range(BATCHES_FIRST)):
+        if is_short and not all(self._write_topic.take() for _ in range(BATCHES_FIRST)):
             with self._site.lock:
                 self.peers.missed(presence, time.monotonic_ns())
 
-    def _strange(self, found: PresenceVerdict, presence: Presence) -> None:
+    def _report_stranger(self, found: PresenceVerdict, presence: Presence) -> None:
         name = part_name(self._rack.config, presence.slots)
         if found is PresenceVerdict.SEAT_TAKEN and self.stage is Stage.JOINING and presence.state == Stage.RUNNING:
             self.fault = ProcessAlreadyRuns(

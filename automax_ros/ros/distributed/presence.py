@@ -33,23 +33,23 @@ class PresencePublisher:
         self._site, self._process = site, int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._publisher = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
         kind, terms = "automax_msgs/msg/Presence", Terms(_MOST_BYTES)
-        BusTopic(node, PRESENCE, kind, QoSProfile(depth=10), self._heard, self._refuse, terms)
+        BusTopic(node, PRESENCE, kind, QoSProfile(depth=10), self._receive, self._refuse, terms)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(PERIOD_NS / NS_PER_S, node.guarded_callback(PRESENCE, self._tell), clock=steady)
+        node.create_timer(PERIOD_NS / NS_PER_S, node.guarded_callback(PRESENCE, self._publish), clock=steady)
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         rack, run_id = self._site.rack, self._site.stream.run_id
         slots = tuple(sorted(rack.part.slots))
-        word = Presence(
+        presence = Presence(
             time.time_ns(), rack.config.name, run_id, self._process, slots[0], slots, rack.installed, int(Stage.RUNNING)
         )
-        self._publisher.publish(encode(word))
+        self._publisher.publish(encode(presence))
 
-    def _heard(self, word: Presence, _: bytes) -> None:
-        if word.process != self._process:
+    def _receive(self, presence: Presence, _: bytes) -> None:
+        if presence.process != self._process:
             name = self._site.rack.config.name
             text = f"another rack is called {name}: what the two send cannot be told apart"
-            self._site.health.note("other rack", word.run_id, lambda: text, most=FROM_STRANGERS)
+            self._site.health.note("other rack", presence.run_id, lambda: text, most=FROM_STRANGERS)
 
     def _refuse(self, topic: str, what: str) -> None:
         self._site.health.note("refused message", topic, lambda: f"{topic}: {what} was refused")

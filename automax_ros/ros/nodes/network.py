@@ -31,7 +31,7 @@ from automax_ros.ros.intake.guard import Throttle
 from automax_ros.ros.intake.raw_messages import TopicReader
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
-TELL_INTERVAL_S = 0.2
+LOG_INTERVAL_S = 0.2
 """Changes on the network are logged at most this often."""
 TYPE = "automax_msgs/msg/NetworkDrop"
 MOST_WAITING = NETWORK.depth
@@ -49,15 +49,15 @@ class NetworkNode(ModuleNode):
         self._module, self._slot, self._model = module, module.config.slot, module.config.model
         name = network_topic(site.rack.config.namespace, module.network)
         self._waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
-        self._told: tuple[object, ...] = ("", (), ())
-        self._throttle = Throttle(TELL_INTERVAL_S)
+        self._logged: tuple[object, ...] = ("", (), ())
+        self._throttle = Throttle(LOG_INTERVAL_S)
         self._publish = self.outlet(Topic(name, TYPE, NETWORK, self._slot))
         subscription = self.own_subscription(message_class(TYPE), name, ros_qos(NETWORK))
         # Messages wait for the next cycle; b"" replaces one that is too long.
         site.intake.add(TopicReader(subscription, MOST_BYTES, lambda taken: self._waiting.append(taken.payload or b"")))
         module.connect(self._send)
         scheduler, key = site.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
-        scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._look())
+        scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._check())
         self.diagnose(self._health)
 
     def _send(self, now_ns: int, frames: Sequence[DropMessage]) -> None:
@@ -78,7 +78,7 @@ class NetworkNode(ModuleNode):
             )
             self._publish(stamp, encode(message))
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
         if waiting:
             arrived = [_read(payload) for payload in waiting]
@@ -86,13 +86,13 @@ class NetworkNode(ModuleNode):
             known = [item for item in arrived if item is not None and (item[0].run_id, item[0].slot) != own]
             self._module.receive(known, damaged=arrived.count(None))
         status = self._module.status()
-        told = (status.code, status.lost, status.rivals)
-        if told != self._told and self._throttle.passes():
-            self._told = told
-            self._tell(status)
+        shown = (status.code, status.lost, status.rivals)
+        if shown != self._logged and self._throttle.passes():
+            self._logged = shown
+            self._log_status(status)
             self.site.diagnostics.look()
 
-    def _tell(self, status: NetworkStatus) -> None:
+    def _log_status(self, status: NetworkStatus) -> None:
         network, log = self._module.network, self.get_logger()
         if status.rivals:
             who = ", ".join(map(str, status.rivals))

@@ -68,12 +68,12 @@ class JoinedTasks:
             for module in rack.config.modules
             if module.slot not in rack.part.slots
         }
-        self._heard: dict[str, tuple[int, list[RemoteTask]]] = {}
+        self._parts: dict[str, tuple[int, list[RemoteTask]]] = {}
         BusTopic(node, PARTS, NAMES[RemoteTable], ros_qos(PART), self._take, self._refuse, Terms(MOST_BYTES))
 
     def tasks(self, now_ns: int) -> Sequence[RemoteTask]:
         """Return the tasks of all modules whose parts are recent."""
-        return [item for at_ns, items in self._heard.values() if now_ns - at_ns <= SILENT_NS for item in items]
+        return [item for at_ns, items in self._parts.values() if now_ns - at_ns <= SILENT_NS for item in items]
 
     def _take(self, table: RemoteTable, _: bytes) -> None:
         if table.run_id != self._site.stream.run_id:
@@ -85,7 +85,7 @@ class JoinedTasks:
                 return
             modules.setdefault(item.module, []).append(item)
         now_ns = self._site.rack.now_ns
-        self._heard |= {module: (now_ns, items) for module, items in modules.items()}
+        self._parts |= {module: (now_ns, items) for module, items in modules.items()}
         self._changed()
 
     def _refuse(self, topic: str, what: str) -> None:
@@ -99,7 +99,7 @@ class StatusTables:
         self._rack, self._stream, self._pace = node.site.rack, node.site.stream, node.site.pacer
         part = self._rack.part
         self._tasks = node.create_publisher(TaskTable, "tasks" if part.holds_common_memory else PARTS, ros_qos(LATCHED))
-        self._joined = JoinedTasks(node, self._soon) if part.holds_common_memory and not part.is_whole else None
+        self._joined = JoinedTasks(node, self._check_soon) if part.holds_common_memory and not part.is_whole else None
         self._statistics = node.create_publisher(ScanStatistics, "statistics", STATISTICS_DEPTH)
         self._forces = (
             node.create_publisher(ForceTable, "forces", ros_qos(LATCHED))
@@ -107,7 +107,7 @@ class StatusTables:
             else None
         )
         self._sent: dict[type, Any] = {}
-        self._reported_ns = self._next_look_ns = self._rack.now_ns
+        self._reported_ns = self._next_check_ns = self._rack.now_ns
         self._is_pending = False
         self._key = EventKey(EventClass.OBSERVE, 0, "tables")
         self._rack.scheduler.every(PERIOD_NS, self._rack.now_ns, self._key, lambda now, _: self._report(now))
@@ -126,17 +126,17 @@ class StatusTables:
 
     def operated(self, operation: Operation) -> None:  # noqa: ARG002
         """Check the tables after the other events of this instant."""
-        self._soon()
+        self._check_soon()
 
-    def _soon(self) -> None:
+    def _check_soon(self) -> None:
         if is_halted(self._pace):
             self.look(self._rack.now_ns)
         elif not self._is_pending:
             self._is_pending = True
-            self._rack.scheduler.at(max(self._rack.now_ns, self._next_look_ns), self._key, self._look_at)
+            self._rack.scheduler.at(max(self._rack.now_ns, self._next_check_ns), self._key, self._check_at)
 
-    def _look_at(self, now_ns: int) -> None:
-        self._is_pending, self._next_look_ns = False, now_ns + LOOK_NS
+    def _check_at(self, now_ns: int) -> None:
+        self._is_pending, self._next_check_ns = False, now_ns + LOOK_NS
         self.look(now_ns)
 
     def look(self, now_ns: int) -> None:

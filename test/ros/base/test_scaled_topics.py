@@ -2,12 +2,7 @@
 
 import math
 import time
-from pathlib import Path
 
-import pytest
-
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from ros.support import until
 
 RACK = """\
@@ -21,20 +16,7 @@ common:
   SPEED%: {slot: 7, register: 3, ros: out, scale: {counts: [-4095, 4095], value: [-1750.0, 1750.0]}, unit: rpm}
   REF%: {ros: in}
 """
-TASK = "10 COMMON PRESSURE%, SPEED%\n20 CALL SCAN_LOOP(TICKS=1)\n30 SPEED% = -PRESSURE%\n40 END\n"
-
-
-@pytest.fixture
-def live(ros_domain_id, tmp_path: Path):
-    from automax_ros.ros.rack_nodes import LiveRack
-
-    (tmp_path / "T.BLK").write_text(TASK)
-    (tmp_path / "rack.yaml").write_text(RACK)
-    config = load(tmp_path / "rack.yaml").config
-    made = LiveRack(Rack(config))
-    made.start([])
-    yield made
-    made.close()
+SOURCES = {"T": "10 COMMON PRESSURE%, SPEED%\n20 CALL SCAN_LOOP(TICKS=1)\n30 SPEED% = -PRESSURE%\n40 END\n"}
 
 
 def test_bars_in_and_revolutions_out(live, client):

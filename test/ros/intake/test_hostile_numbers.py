@@ -2,43 +2,15 @@
 
 import math
 
-import pytest
-from system.support import RACKS, Client
+from system.support import RACKS
 
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from ros.intake.test_service_requests import parameter
 from ros.support import until
 
 MOST = (1 << 63) - 1
+CONFIG = RACKS / "operated" / "rack.yaml"
 NUMBERS = (math.nan, math.inf, -math.inf, 1e308, -1e308, -1.0, 5e-324)
 LONG = "A" * 900_000
-
-
-@pytest.fixture
-def live(ros_domain_id):
-    from automax_ros.ros.rack_nodes import LiveRack
-
-    made = LiveRack(Rack(load(RACKS / "operated" / "rack.yaml").config))
-    made.start([])
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def ask(live, client: Client):
-    clients = {}
-
-    def ask(kind, service, **fields):
-        name = f"/operated/{service}"
-        if name not in clients:
-            clients[name] = client.node.create_client(kind, name)
-            until(live, client, clients[name].service_is_ready)
-        future = clients[name].call_async(kind.Request(**fields))
-        until(live, client, future.done)
-        return future.result()
-
-    return ask
 
 
 def goes_on(live, client) -> None:
@@ -52,17 +24,17 @@ def test_an_operator_of_numbers_that_nobody_means(live, client, ask):
     from std_srvs.srv import Trigger
 
     for number in NUMBERS:
-        assert not ask(Power, "power", what="cycle", off_for_s=number).ok or number == 5e-324
+        assert not ask("power", Power, what="cycle", off_for_s=number).ok or number == 5e-324
         if number == 5e-324:
             until(live, client, lambda: live.rack.operations.powered)
-    assert ask(Trigger, "run_all").success
+    assert ask("run_all", Trigger).success
     held = live.rack.value("REF%")
-    assert ask(Trigger, "pause").success
+    assert ask("pause", Trigger).success
     for number in (*NUMBERS[:-1], 2.0**63, 2.0**64):
-        assert not ask(Step, "step", what="until", until_s=number).ok
-    assert not ask(Step, "step", what="tick", count=(1 << 32) - 1).ok
-    assert ask(Step, "step", what="scan", count=(1 << 32) - 1).why == "the time is over"
-    assert ask(Trigger, "resume").success
+        assert not ask("step", Step, what="until", until_s=number).ok
+    assert not ask("step", Step, what="tick", count=(1 << 32) - 1).ok
+    assert ask("step", Step, what="scan", count=(1 << 32) - 1).why == "the time is over"
+    assert ask("resume", Trigger).success
     for value in (
         "nan",
         "inf",
@@ -78,16 +50,16 @@ def test_an_operator_of_numbers_that_nobody_means(live, client, ask):
         LONG,
     ):
         for service, name in (("set", "REF%"), ("force", "REF%"), ("force", "LINE.N%"), ("tune", "SPEED.TRIM%")):
-            assert not ask(SetValue, service, name=name, value=value).ok, (service, value[:20])
+            assert not ask(service, SetValue, name=name, value=value).ok, (service, value[:20])
         for service, name, control in (("module", "0", "x"), ("plant", "P", "load_torque_nm")):
-            assert not ask(OperateControl, service, name=name, control=control, value=value).ok
+            assert not ask(service, OperateControl, name=name, control=control, value=value).ok
     for name in ("REF%(9223372036854775807)", "REF%(-1)", "REF%(1e308)", "." * 99, "LINE." * 15, "\x01", LONG):
-        assert not ask(SetValue, "set", name=name, value="1").ok
-        assert not ask(ReadValues, "get", names=[name]).ok
-        assert not ask(OperateTask, "run", task=name).ok
-        assert not ask(ReadErrors, "errors", task=name).ok
-        assert not ask(Reload, "reload", task=name, source="10 END").ok
-    assert not ask(ReadValues, "get", names=["REF%"] * 1001).ok
+        assert not ask("set", SetValue, name=name, value="1").ok
+        assert not ask("get", ReadValues, names=[name]).ok
+        assert not ask("run", OperateTask, task=name).ok
+        assert not ask("errors", ReadErrors, task=name).ok
+        assert not ask("reload", Reload, task=name, source="10 END").ok
+    assert not ask("get", ReadValues, names=["REF%"] * 1001).ok
     assert (live.rack.value("REF%"), live.rack.forces()) == (held, [])
     goes_on(live, client)
 
@@ -100,11 +72,11 @@ def test_parameters_of_numbers_that_nobody_means(live, client, ask):
     values += [parameter("SPEED.TRIM%", 7, integer_array_value=[MOST] * 5000)]
     values += [parameter("SPEED.TRIM%", 4, string_value=LONG), parameter(LONG, 2, integer_value=1), parameter("", 0)]
     for value in values:
-        found = ask(SetParameters, "processor_1/set_parameters", parameters=[value])
+        found = ask("processor_1/set_parameters", SetParameters, parameters=[value])
         assert not any(result.successful for result in found.results), value
-    ask(ListParameters, "processor_1/list_parameters", prefixes=["", "." * 1000, LONG], depth=(1 << 64) - 1)
-    ask(GetParameters, "processor_1/get_parameters", names=["", LONG, "\x01"])
-    ask(DescribeParameters, "processor_1/describe_parameters", names=["", LONG])
+    ask("processor_1/list_parameters", ListParameters, prefixes=["", "." * 1000, LONG], depth=(1 << 64) - 1)
+    ask("processor_1/get_parameters", GetParameters, names=["", LONG, "\x01"])
+    ask("processor_1/describe_parameters", DescribeParameters, names=["", LONG])
     assert live.rack.task("SPEED").value("TRIM%") == 1
     goes_on(live, client)
 
@@ -115,5 +87,5 @@ def test_transitions_that_nobody_means(live, client, ask):
 
     for node in ("rack", "processor_1"):
         for wanted in ({"id": 255}, {"id": 0}, {"label": LONG}, {"label": "\x01"}, {"label": "transition_success"}):
-            assert not ask(ChangeState, f"{node}/change_state", transition=Transition(**wanted)).success
+            assert not ask(f"{node}/change_state", ChangeState, transition=Transition(**wanted)).success
     goes_on(live, client)

@@ -1,12 +1,9 @@
 """The node of a plant over real DDS: its shaft and state, the load from ROS, faults and switches by services."""
 
 from math import pi
-from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from ros.support import until
 
 RACK = """\
@@ -24,19 +21,6 @@ SOURCES = {
     "LINE": "10 CALL SCAN_LOOP(TICKS=20)\n20 END\n",
     "WIND_B": "100 CALL SCAN_LOOP(TICKS=20)\n900 END\n",
 }
-
-
-@pytest.fixture
-def live(ros_domain_id, tmp_path: Path):
-    from automax_ros.ros.rack_nodes import LiveRack
-
-    for name, text in SOURCES.items():
-        (tmp_path / f"{name}.BLK").write_text(text)
-    (tmp_path / "rack.yaml").write_text(RACK)
-    made = LiveRack(Rack(load(tmp_path / "rack.yaml").config))
-    made.start([])
-    yield made
-    made.close()
 
 
 def test_shafts_and_states_are_heard_and_ros_loads_a_shaft(live, client):
@@ -90,7 +74,7 @@ def test_shafts_and_states_are_heard_and_ros_loads_a_shaft(live, client):
     assert "interrupts" not in {item.key for item in health["wind/drive_plant_10_B: plant WINDER"].values}
 
 
-def test_faults_and_switches_by_services(live, client):
+def test_faults_and_switches_by_services(live, client, ask):
     from automax_msgs.msg import Operation, PlantState
     from automax_msgs.srv import OperateControl
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -101,15 +85,10 @@ def test_faults_and_switches_by_services(live, client):
     client.node.create_subscription(
         DiagnosticArray, "/diagnostics", lambda item: health.update({part.name: part for part in item.status}), 10
     )
-    services = {}
 
     def asked(service: str, name: str, control: str, value: str):
-        if service not in services:
-            services[service] = client.node.create_client(OperateControl, f"/wind/{service}")
-            until(live, client, services[service].service_is_ready)
-        future = services[service].call_async(OperateControl.Request(name=name, control=control, value=value))
-        until(live, client, future.done)
-        return future.result().ok, future.result().reason
+        response = ask(service, OperateControl, name=name, control=control, value=value)
+        return response.ok, response.reason
 
     assert asked("plant", " unwind ", "short_scr", "3") == (True, "")
     assert asked("module", "7", "test_switch", "a") == (True, "")

@@ -1,12 +1,7 @@
 """Joints over real DDS: commands as a controller of ros2_control sends them, and the shaft's own name."""
 
 from math import pi
-from pathlib import Path
 
-import pytest
-
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from ros.support import until
 
 RACK = """\
@@ -29,19 +24,6 @@ SOURCES = {
     "LINE": "10 CALL SCAN_LOOP(TICKS=20)\n20 END\n",
     "WIND_A": "100 CALL SCAN_LOOP(TICKS=20)\n900 END\n",
 }
-
-
-@pytest.fixture
-def live(ros_domain_id, tmp_path: Path):
-    from automax_ros.ros.rack_nodes import LiveRack
-
-    for name, text in SOURCES.items():
-        (tmp_path / f"{name}.BLK").write_text(text)
-    (tmp_path / "rack.yaml").write_text(RACK)
-    made = LiveRack(Rack(load(tmp_path / "rack.yaml").config))
-    made.start([])
-    yield made
-    made.close()
 
 
 def test_commands_of_controllers_write_the_commons_of_the_joint(live, client):

@@ -1,11 +1,5 @@
 """The node of a UDC over real DDS: its scans on the wall clock, its tunables, its entry in /diagnostics."""
 
-from pathlib import Path
-
-import pytest
-
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from ros.support import until
 
 RACK = """\
@@ -35,19 +29,6 @@ SOURCES = {
 900 END
 """,
 }
-
-
-@pytest.fixture
-def live(ros_domain_id, tmp_path: Path):
-    from automax_ros.ros.rack_nodes import LiveRack
-
-    for name, text in SOURCES.items():
-        (tmp_path / f"{name}.BLK").write_text(text)
-    (tmp_path / "rack.yaml").write_text(RACK)
-    made = LiveRack(Rack(load(tmp_path / "rack.yaml").config))
-    made.start([])
-    yield made
-    made.close()
 
 
 def test_a_udc_on_the_wall_clock(live, client):
