@@ -144,7 +144,6 @@ def read_measures(text: str, config: RackConfig, duration_ns: int) -> tuple[Meas
 
 
 def _closing(text: str, place: int) -> int:
-    """Return the place of the parenthesis that closes the one opened before ``place``."""
     depth = 1
     for at in range(place, len(text)):
         depth += {"(": 1, ")": -1}.get(text[at], 0)
@@ -179,7 +178,6 @@ def _measure(name: str, inner: str, config: RackConfig, duration_ns: int) -> Mea
 
 
 def _parts(inner: str) -> list[str]:
-    """Return the parts between commas, except those within a subscript."""
     parts, depth = [""], 0
     for char in inner:
         depth += {"(": 1, ")": -1}.get(char, 0)
@@ -203,7 +201,6 @@ def _times(name: str, inner: str) -> dict[str, int]:
 
 
 def _subject(function: Function, name: str, text: str, config: RackConfig) -> str:
-    """Return the full name of a measure's subject."""
     if function.subject is Subject.NOTHING:
         if text:
             raise UserError(f"{name} is of the rack, not of {quoted(text)}", f"write {name}")

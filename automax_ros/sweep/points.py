@@ -122,7 +122,6 @@ def _check_count(count: int) -> None:
 
 
 def _exact(variable: Variable, text: str) -> Fraction:
-    """Return an end of a range exactly as written; it must fit."""
     variable.accepted(text.strip())
     return Fraction(text.strip())
 

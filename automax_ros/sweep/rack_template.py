@@ -51,7 +51,6 @@ class RackTemplate:
 
 @lru_cache(maxsize=1)
 def _config(text: str, path: str, numbers: tuple[tuple[PlantNumber, str], ...] = ()) -> RackConfig:
-    """Return the configuration in a text with other numbers of plants; consecutive runs often have the same."""
     result = load_stored(SourceText(path, with_numbers(text, dict(numbers))), Path(path))
     if result.config is None:
         first = next(item for item in result.diagnostics if item.severity is Severity.ERROR)

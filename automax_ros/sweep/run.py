@@ -37,11 +37,7 @@ class Stimuli:
 
     @classmethod
     def of(cls, path: Path, *, allow_outside: bool) -> Stimuli:
-        """Return a file as it is now.
-
-        Raises:
-            UserError: it cannot be read.
-        """
+        """Return a file as it is now; raises UserError if it cannot be read."""
         return cls(path.absolute(), _digest(path), allow_outside)
 
 
@@ -72,11 +68,7 @@ class Outcome:
 
 
 def run_points(plan: Plan, points: Sequence[Point]) -> list[Outcome]:
-    """Run points one after the other, as one job.
-
-    Raises:
-        UserError: the stimuli file differs from the plan's.
-    """
+    """Run points one after the other, as one job; raises UserError if the stimuli file differs from the plan's."""
     if plan.stimuli is not None and _digest(plan.stimuli.path) != plan.stimuli.digest:
         raise UserError(f"the stimuli file {plan.stimuli.path} is another one on {platform.node()}")
     return [run_point(plan, point) for point in points]

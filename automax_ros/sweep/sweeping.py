@@ -55,7 +55,6 @@ def run_sweep(
 
 
 def _size(count: int, where: Workers) -> int:
-    """Return the number of runs in a piece."""
     if where.scheduler is None and where.processes == 1:
         return 1
     pieces = _CLUSTER_PIECES if where.scheduler is not None else where.processes * _PIECES_EACH
@@ -69,7 +68,6 @@ def _piece(plan: Plan, points: Sequence[Point], first: int, size: int) -> Job:
 
 
 def _rows(done: JobResult, first: int) -> Iterable[Row]:
-    """Return the rows of a piece; if the piece itself has failed, each has its fault."""
     plan, points = done.piece.arguments
     outcomes = done.result
     if outcomes is None:

@@ -27,7 +27,6 @@ class _Window:
     has_begun: bool = False
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        """Add the part of a piece of the signal that is within the window."""
         begin, end = max(begin_ns, self.start_ns), min(end_ns, self.end_ns)
         if begin_ns < self.start_ns:
             self.last = value
@@ -39,7 +38,6 @@ class _Window:
             self.accumulator.hold(value, begin - self.start_ns, end - self.start_ns)
 
     def result(self) -> float | None:
-        """Return the measure."""
         return self.accumulator.result(self.last, self.end_ns - self.start_ns)
 
 
@@ -52,14 +50,12 @@ class _Signal:
     windows: list[_Window] = field(default_factory=list)
 
     def change(self, time_ns: int, value: Value) -> None:
-        """Set a value that holds from ``time_ns`` on."""
         assert not isinstance(value, str)
         if value != self.value:
             self.flush(time_ns)
             self.value = value
 
     def flush(self, time_ns: int) -> None:
-        """Add the present value up to a time to all windows."""
         if time_ns > self.since_ns:
             for window in self.windows:
                 window.hold(self.value, self.since_ns, time_ns)

@@ -174,11 +174,7 @@ def tuning_of(call: DynamicCall, program: Program) -> Tuning:
 
 
 def require_running(call: DynamicCall) -> None:
-    """Refuse a block that holds its output.
-
-    Raises:
-        CallFault: an input that stops it, such as RESET, is TRUE.
-    """
+    """Refuse a block that holds its output; raises CallFault if an input that stops it, such as RESET, is TRUE."""
     for name, what in call.dynamics.stopped_by:
         given = call.parameters.get(name)
         if given is not None and given.value is True:
@@ -186,7 +182,6 @@ def require_running(call: DynamicCall) -> None:
 
 
 def _refuse(name: str, calls: Sequence[DynamicCall]) -> None:
-    """Refuse to set a variable that a block uses, but not as a settable input."""
     for call in calls:
         for item in call.parameters.values():
             if not item.variable or _plain(item.variable) != name:
@@ -247,7 +242,6 @@ def _calls_in_order(
 
 
 def _subroutines(program: Program) -> set[int]:
-    """Return the lines at which subroutines start."""
     found: set[int] = set()
     for statement, _ in statements_in_order((*program.startup, *program.scan)):
         if isinstance(statement, Gosub):
@@ -277,7 +271,6 @@ def _listed(bound: Mapping[str, tuple[BoundCall, str]]) -> str:
 
 
 def _output(bound: BoundCall) -> str:
-    """Return the text of the variable that receives the block's output."""
     assert bound.block.coefficients is not None
     wanted = bound.block.coefficients.dynamics.output
     return print_expression(bound.arguments[wanted]) if wanted in bound.arguments else "-"

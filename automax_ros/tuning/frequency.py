@@ -113,7 +113,6 @@ class Sweep:
         )
 
     def _fitting_amplitude(self, rad_s: float) -> int:
-        """Return an amplitude that keeps OUTPUT and the integrator away from their limits."""
         most = float(NORMAL_AMPLITUDE)
         gain = abs(self._transfer.discrete_response(rad_s))
         if gain > 0.0:
@@ -262,7 +261,6 @@ def first_phase(transfer: Transfer) -> float | None:
 
 
 def _zeros_at_0(polynomial: Sequence[float]) -> int:
-    """Return the number of trailing factors that are 0."""
     return next((count for count, factor in enumerate(reversed(polynomial)) if factor), 0)
 
 

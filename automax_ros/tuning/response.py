@@ -136,7 +136,6 @@ def followed(transfer: Transfer, frequencies: Sequence[float], *, laplace: bool)
 
 
 def _frequencies(wanted: Range, tuning: Tuning) -> list[tuple[float, str]]:
-    """Return the frequencies in rising order, with those of corners and WM inserted under their names."""
     found = [(rad_s, "") for rad_s in logarithmic(wanted.low, wanted.high, wanted.points)]
     for name, rad_s in marked_frequencies(tuning):
         if not wanted.low * (1.0 - _SAME) <= rad_s <= wanted.high * (1.0 + _SAME):

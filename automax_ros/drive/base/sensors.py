@@ -15,12 +15,10 @@ class _Sensor(Stateful):
     """A sensor with a source of noise."""
 
     def __init__(self, seed: int) -> None:
-        """Create a sound sensor; readings repeat for the same seed."""
         self.lost = False
         self._random = Random(seed)
 
     def state(self) -> SavedState:
-        """Return whether it is lost, and the position in its noise sequence."""
         version, words, following = self._random.getstate()
         return super().state() | {"noise": [version, list(words), following]}
 

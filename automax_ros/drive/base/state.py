@@ -39,11 +39,7 @@ class Stateful:
 
 
 def check_names(part: str, state: SavedState, names: tuple[str, ...]) -> None:
-    """Check that a state has exactly the required names.
-
-    Raises:
-        ParameterError: a name is missing or not expected.
-    """
+    """Check that a state has exactly the required names; raises ParameterError if a name is missing or not expected."""
     if set(state) != set(names):
         raise ParameterError(f"this is not the state of a {part}: it needs {', '.join(names) or 'nothing'}")
 

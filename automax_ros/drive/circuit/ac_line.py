@@ -265,11 +265,7 @@ class AcLine(Stateful):
         return super().state() | courses | {"missing": sorted(self.missing)}
 
     def restore(self, state: SavedState) -> None:
-        """Restore a state.
-
-        Raises:
-            ParameterError: it is not the state of a line.
-        """
+        """Restore a state; raises ParameterError if it is not the state of a line."""
         check_names("line", state, (*self._kept, "frequency", "voltage", "missing"))
         super().restore({name: state[name] for name in self._kept})
         self._frequency.restore(state["frequency"])

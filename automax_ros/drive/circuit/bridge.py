@@ -181,11 +181,7 @@ class Bridge(Stateful):
         return super().state() | {"wiring": wiring}
 
     def restore(self, state: SavedState) -> None:
-        """Restore a state.
-
-        Raises:
-            ParameterError: it is not the state of a bridge.
-        """
+        """Restore a state; raises ParameterError if it is not the state of a bridge."""
         check_names("bridge", state, (*self._kept, "wiring"))
         super().restore({name: state[name] for name in self._kept})
         wiring = state["wiring"]

@@ -305,14 +305,12 @@ class Circuit(Conduction):
         self._net = self._network(state["conducting"])
 
     def _built(self) -> list[Network]:
-        """Return the cached networks, including the one in force, one per mask."""
         found = {net.mask: net for net in [*self._nets.values(), self._net]}
         return [found[mask] for mask in sorted(found)]
 
     # Changes from outside
 
     def _change_line(self, now_ns: int) -> None:
-        """Begin the line's next segment."""
         line = self.line
         phases = self.phase_currents()
         before = line.omega, line.amplitude_v
@@ -327,7 +325,6 @@ class Circuit(Conduction):
                 self.close_phase(phase)
 
     def _rewire(self, phases: Phases, left_on: int = 0) -> None:
-        """Apply a change of the wiring or the line, given the phase currents (A) just before."""
         old = self._net
         self._nets.clear()
         angle = self.line.angle(self.now_ns)

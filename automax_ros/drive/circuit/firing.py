@@ -46,7 +46,6 @@ class ConstantAlpha(Stateful):
     _kept = ("alpha_rad", "pulse_rad", "bridge", "_order", "_position", "_natural_ns")
 
     def __init__(self, circuit: Circuit, alpha_rad: float, *, bridge: int = 1, pulse_rad: float = SIXTH) -> None:
-        """Create the controller, which fires from the circuit's present on."""
         self.circuit = circuit
         self.alpha_rad = require("alpha in rad", alpha_rad, 0.0, pi)
         self.pulse_rad = require("pulse length in rad", pulse_rad, 0.0, 2 * SIXTH, above=True)

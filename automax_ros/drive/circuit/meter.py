@@ -44,7 +44,6 @@ class Sample:
         pieces: list[WavePiece],
         highest_a: float = inf,
     ) -> None:
-        """Create the sample from the integrals and an upper bound of the current's magnitude (A)."""
         self.duration_s = duration_s
         self.charge_c = charge_c
         self.volt_s = volt_s

@@ -59,11 +59,7 @@ def direction_of(number: int) -> int:
 
 
 def mask_of(numbers: Iterable[int]) -> int:
-    """Return the mask of SCRs.
-
-    Raises:
-        GateError: there is no SCR of a number.
-    """
+    """Return the mask of SCRs; raises GateError if there is no SCR of a number."""
     return _mask_of(tuple(numbers))
 
 

@@ -149,7 +149,6 @@ class WavePiece:
     def __init__(
         self, duration_s: float, theta: float, omega: float, c: float, d: float, k: float, a: float, decay: float
     ) -> None:
-        """Create the piece from its duration (s), the line's angle at its start and frequency, and its factors."""
         self.duration_s = duration_s
         self.theta = theta
         self.omega = omega

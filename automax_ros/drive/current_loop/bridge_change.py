@@ -52,7 +52,6 @@ class BridgeChange(Stateful):
     _kept = ("bridge", "stage")
 
     def __init__(self) -> None:
-        """Create the selection, with bridge 1 in use."""
         self.bridge = 1
         self.stage = Stage.NONE
 

@@ -44,7 +44,6 @@ class CurrentControl(Stateful):
     _kept = ("i_fdbk", "dc_time", "part", "block", "_fresh")
 
     def __init__(self) -> None:
-        """Create the control with everything off."""
         self.i_fdbk = 0
         self.dc_time = 0
         self.part = 0.0

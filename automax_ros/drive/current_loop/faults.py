@@ -72,7 +72,6 @@ class Faults(Stateful):
     _kept = ("active", "bad_scr_num", "_shown", "_sync_left", "_deltas", "_delta_sum", "_delta_count")
 
     def __init__(self) -> None:
-        """Create the faults, none active."""
         self.active = 0
         self.bad_scr_num = 0
         self._shown = 0

@@ -37,7 +37,6 @@ class Firing(Stateful):
     _kept = ("count", "last")
 
     def __init__(self) -> None:
-        """Create the planner, with nothing fired yet."""
         self.count = 0
         self.last = -6
 

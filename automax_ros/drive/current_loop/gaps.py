@@ -44,7 +44,6 @@ class Gaps(Stateful):
     _kept = ("recent", "left", "_wanted", "_steady")
 
     def __init__(self) -> None:
-        """Create the watch, without a current."""
         self.recent = [0.0] * CYCLE
         self.left = 0
         self._wanted = 0.0

@@ -44,7 +44,6 @@ class Pll(Stateful):
     )  # fmt: skip
 
     def __init__(self) -> None:
-        """Create the loop, unlocked and without a line."""
         self.locked = False
         self.period_ns = 16_666_667
         self.position = 0
@@ -55,7 +54,6 @@ class Pll(Stateful):
         self._forget()
 
     def _forget(self) -> None:
-        """Search for T1's maxima from now on."""
         self._passed_ns = self._since_ns = 0
         self._maximum_ns = NEVER
 

@@ -40,7 +40,6 @@ class ScrTest(Stateful):
     _kept = ("bridges", "_scan", "_fired")
 
     def __init__(self) -> None:
-        """Create the test, not begun."""
         self.bridges = 1
         self._scan = self._fired = 0
 

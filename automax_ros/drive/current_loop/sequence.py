@@ -45,7 +45,6 @@ class Sequence(Stateful):
     _kept = ("phase", "relays", "_since_ns", "_run_before")
 
     def __init__(self) -> None:
-        """Create the sequence in standby."""
         self.phase = Phase.STANDBY
         self.relays = 0
         self._since_ns = 0

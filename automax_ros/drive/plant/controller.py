@@ -38,14 +38,12 @@ _new = tuple.__new__
 
 
 def _word(value: float) -> int:
-    """Return a value as a double integer, limited to it."""
     number = round(value)
     return number if -LARGEST <= number <= LARGEST else LARGEST if number > 0 else -LARGEST
 
 
 @lru_cache(maxsize=4096)
 def _gate_mask(word: int) -> int:
-    """Return the SCRs of gate bits as a mask of the bridge."""
     return mask_of(gate_numbers(word))
 
 

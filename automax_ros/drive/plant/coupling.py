@@ -49,12 +49,8 @@ class Coupling(Stateful):
     ) -> None:
         """Couple two motors; stiffly coupled ones start at their common speed.
 
-        Args:
-            first: a circuit with a Motor.
-            second: another.
-            stiffness_n_m_rad: torque per twist, N m/rad; None couples them stiffly.
-            damping_n_m_s: torque per difference of speeds, N m s/rad, of an elastic coupling.
-            ratio: speed of the first motor over that of the second; stiffness and damping are those at the first.
+        ``ratio`` is the speed of the first motor over that of the second; stiffness (torque per twist, N m/rad, None
+        for a stiff shaft) and damping (torque per difference of speeds, N m s/rad) are those at the first.
 
         Raises:
             ParameterError: a machine is not a Motor, a held one is coupled stiffly, or a value is outside its range.
@@ -166,11 +162,7 @@ class CouplingData:
 
 
 class CoupledPlants:
-    """Two plants that advance together.
-
-    Attributes:
-        coupling: the coupling between them.
-    """
+    """Two plants that advance together, with the ``coupling`` between them."""
 
     def __init__(self, first: DrivePlant, second: DrivePlant, data: CouplingData) -> None:
         """Couple two plants at their start.
@@ -207,11 +199,7 @@ class CoupledPlants:
         return self.coupling.state()
 
     def restore(self, state: SavedState) -> None:
-        """Restore a state.
-
-        Raises:
-            ParameterError: it is not the state of a coupling.
-        """
+        """Restore a state; raises ParameterError if it is not the state of a coupling."""
         self.coupling.restore(state)
 
 

@@ -156,7 +156,6 @@ class DrivePlant(Stateful):
     _kept = ("_contacts", "_relay", "_load_nm", "notes", "sag", "sag_end_ns", "usual_hz")
 
     def __init__(self, data: PlantData, *, energy: bool = False) -> None:
-        """Create the plant at rest, without current, the contactor open."""
         parameters = data.parameters
         self.data = data
         self.rated_amps = parameters.amps
@@ -271,11 +270,7 @@ class DrivePlant(Stateful):
         return super().state() | {"circuit": self.circuit.state(), "sync": self.sync.state()}
 
     def restore(self, state: SavedState) -> None:
-        """Restore a state.
-
-        Raises:
-            ParameterError: it is not the state of such a plant.
-        """
+        """Restore a state; raises ParameterError if it is not the state of such a plant."""
         check_names("plant", state, (*self._kept, "circuit", "sync"))
         super().restore({name: state[name] for name in self._kept})
         # Whether energies are metered is up to the observer, and nothing else depends on it.

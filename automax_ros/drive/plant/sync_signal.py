@@ -42,7 +42,6 @@ class SyncSignal(Stateful):
     _kept = ("notches", "noise", "harmonics", "_cycle", "_turn")
 
     def __init__(self) -> None:
-        """Create the signal without disturbances."""
         self.notches: tuple[float, float, int, float] = (0.0, 0.0, 0, 0.0)
         self.noise: tuple[float, int] = (0.0, 0)
         self.harmonics: list[tuple[int, float, float]] = []
@@ -101,11 +100,7 @@ class SyncSignal(Stateful):
         return passed if 0.0 <= passed < TURN else passed % TURN
 
     def restore(self, state: SavedState) -> None:
-        """Restore a state.
-
-        Raises:
-            ParameterError: it is not the state of a sync signal.
-        """
+        """Restore a state; raises ParameterError if it is not the state of a sync signal."""
         super().restore(state)
         self._look_for_rise()
 
