@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from typing import Protocol
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.user_error import UserError
@@ -22,30 +21,25 @@ _RISE = (0.1, 0.9)
 _PERCENT = 100.0
 
 
-class Accumulator(Protocol):
-    """Receives a signal piece by piece and returns one number."""
+class Accumulator:
+    """Receives a signal piece by piece and returns one number.
+
+    ``begin`` receives the value of the signal just before the window, which most functions ignore; ``hold`` a value
+    that held from one time to a later one, where the next piece starts; ``result`` returns the number from the last
+    value and the window's length, None if the signal has none.
+    """
 
     def begin(self, before: float) -> None:
-        """Start with the value of the signal just before the window."""
-        ...
+        pass
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        """Add a value that held from one time to a later one; the next piece starts where this one ends."""
-        ...
+        raise NotImplementedError
 
     def result(self, last: float, end_ns: int) -> float | None:
-        """Return the number, None if the signal has none; ``last`` is the last value added."""
-        ...
+        raise NotImplementedError
 
 
-class _FromNow:
-    """Base of functions that ignore the value before the window."""
-
-    def begin(self, before: float) -> None:
-        """Ignore it."""
-
-
-class Mean(_FromNow):
+class Mean(Accumulator):
     """The average over time."""
 
     def __init__(self) -> None:
@@ -56,11 +50,10 @@ class Mean(_FromNow):
         self._sum += value * (end_ns - begin_ns)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return the sum divided by the time."""
         return self._sum / end_ns
 
 
-class Rms(_FromNow):
+class Rms(Accumulator):
     """The root of the average square over time."""
 
     def __init__(self) -> None:
@@ -71,18 +64,16 @@ class Rms(_FromNow):
         self._sum += value * value * (end_ns - begin_ns)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return the root."""
         return math.sqrt(self._sum / end_ns)
 
 
-class Range(_FromNow):
+class Range(Accumulator):
     """The least and the greatest value."""
 
     def __init__(self) -> None:
         self.least, self.most = math.inf, -math.inf
 
     def hold(self, value: float, begin_ns: int = 0, end_ns: int = 0) -> None:  # noqa: ARG002
-        """Update the extremes."""
         self.least = min(self.least, value)
         self.most = max(self.most, value)
 
@@ -91,7 +82,6 @@ class Least(Range):
     """The least value."""
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return it."""
         return self.least
 
 
@@ -99,7 +89,6 @@ class Most(Range):
     """The greatest value."""
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return it."""
         return self.most
 
 
@@ -107,38 +96,34 @@ class MostAbsolute(Range):
     """The greatest distance from 0."""
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return it."""
         return max(self.most, -self.least)
 
 
-class Final(_FromNow):
+class Final(Accumulator):
     """The value at the end."""
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        """Do nothing: only the end counts."""
+        pass
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return it."""
         return last
 
 
-class TimeTrue(_FromNow):
+class TimeTrue(Accumulator):
     """The time for which a BOOLEAN is TRUE, s."""
 
     def __init__(self) -> None:
         self._ns = 0
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        """Add the time."""
         if value:
             self._ns += end_ns - begin_ns
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return seconds."""
         return self._ns / NS_PER_S
 
 
-class Count:
+class Count(Accumulator):
     """The number of times a BOOLEAN becomes TRUE."""
 
     def __init__(self) -> None:
@@ -149,16 +134,14 @@ class Count:
         self._before = bool(before)
 
     def hold(self, value: float, begin_ns: int = 0, end_ns: int = 0) -> None:  # noqa: ARG002
-        """Compare with the value before."""
         self._count += bool(value) > self._before
         self._before = bool(value)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return the number of edges."""
         return self._count
 
 
-class Itae(_FromNow):
+class Itae(Accumulator):
     """The integral of time times distance from a target, by default 0."""
 
     def __init__(self, target: float = 0) -> None:
@@ -169,11 +152,10 @@ class Itae(_FromNow):
         self._sum += abs(value - self._target) * (end_ns * end_ns - begin_ns * begin_ns)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return value times s²."""
         return self._sum / 2 / NS_PER_S**2
 
 
-class Settle(_FromNow):
+class Settle(Accumulator):
     """The time at which a signal enters a band around its target for good, s; None if it ends outside.
 
     The target is the last value unless it is given. A band in % is one of the target (decision), so that a disturbance
@@ -196,7 +178,6 @@ class Settle(_FromNow):
         _push(self._low, value, end_ns)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return the end of the last piece outside."""
         target = last if self._target is None else self._target
         width = self._width(target)
         if abs(last - target) > width:
@@ -228,7 +209,7 @@ def _last_below(stack: list[tuple[float, int]], level: float) -> int:
     return stack[place - 1][1] if place else 0
 
 
-class Overshoot:
+class Overshoot(Accumulator):
     """How far a signal exceeds its target, % of the step from its value before the window; None without a step."""
 
     def __init__(self, target: float | None = None) -> None:
@@ -240,11 +221,9 @@ class Overshoot:
         self._start = before
 
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:  # noqa: ARG002
-        """Update the extremes."""
         self._range.hold(value)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return the overshoot, 0 if the target is not passed."""
         target = last if self._target is None else self._target
         step = target - self._start
         if step == 0:
@@ -253,7 +232,7 @@ class Overshoot:
         return max(0.0, beyond / abs(step) * _PERCENT)
 
 
-class Rise:
+class Rise(Accumulator):
     """The time of a signal from 10 % to 90 % of the step from its value before the window, s; None without one."""
 
     def __init__(self, target: float | None = None) -> None:
@@ -276,7 +255,6 @@ class Rise:
                     )
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
-        """Return the time between the two levels, each when it is first reached."""
         target, start = last if self._target is None else self._target, self._start
         step = target - start
         if step == 0:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from automax_ros.core.names import NameFault
 from automax_ros.core.text import near_or_listed, quoted
@@ -25,73 +24,30 @@ class Beginning:
     settings: list[tuple[str, Value]] = field(default_factory=list)
 
 
-class Quantity(Protocol):
-    """A quantity that varies. ``label`` is its full name; ``text`` writes a value so that it is read as the same."""
-
-    @property
-    def label(self) -> str: ...  # noqa: D102
-
-    def text(self, value: Value, /) -> str: ...  # noqa: D102
-
-    def give(self, value: Value, beginning: Beginning) -> None:
-        """Add a value of the quantity to a run's start values."""
-        ...
-
-
 @dataclass(frozen=True)
-class VariedTunable:
-    """A tunable of a task, ``name`` with its type character."""
+class Quantity:
+    """A quantity that varies: a number of a plant, a tunable of a task, or a common.
 
-    task: str
-    name: str
-
-    @property
-    def label(self) -> str:
-        """``TASK.NAME``."""
-        return f"{self.task}.{bare_name(self.name)}"
-
-    def text(self, value: Value) -> str:
-        """Return a value as text that is read as the same value."""
-        return value_text(value)
-
-    def give(self, value: Value, beginning: Beginning) -> None:
-        """Add the tuning, to be made before RUN."""
-        beginning.tunings.append(Tuning(self.task, self.name, value))
-
-
-@dataclass(frozen=True)
-class VariedCommon:
-    """A simple common, or an element of an array; ``label`` has its subscripts."""
+    ``label`` is its full name: ``PLANT.key.key``, ``TASK.NAME``, or a common with its subscripts. ``tunable`` is the
+    task with the tunable's name and type character.
+    """
 
     label: str
+    plant: PlantNumber | None = None
+    tunable: tuple[str, str] | None = None
 
     def text(self, value: Value) -> str:
         """Return a value as text that is read as the same value."""
-        return value_text(value)
+        return value_text(value) if self.plant is None else repr(value)
 
     def give(self, value: Value, beginning: Beginning) -> None:
-        """Add the write, to be made before RUN, after the presets."""
-        beginning.settings.append((self.label, value))
-
-
-@dataclass(frozen=True)
-class VariedPlant:
-    """A number of a plant."""
-
-    number: PlantNumber
-
-    @property
-    def label(self) -> str:
-        """``PLANT.key.key``."""
-        return self.number.label
-
-    def text(self, value: Value) -> str:
-        """Return a value as text that is read as the same value."""
-        return repr(value)
-
-    def give(self, value: Value, beginning: Beginning) -> None:
-        """Add the number, with which the plant is built."""
-        beginning.plants[self.number] = self.text(value)
+        """Add a value to a run's start values: tunings and writes are made before RUN, writes after the presets."""
+        if self.plant is not None:
+            beginning.plants[self.plant] = self.text(value)
+        elif self.tunable is not None:
+            beginning.tunings.append(Tuning(*self.tunable, value))
+        else:
+            beginning.settings.append((self.label, value))
 
 
 @dataclass(frozen=True)
@@ -140,11 +96,10 @@ def _common(rack: Rack, text: str) -> Variable:
     def accepted(given: str) -> Value:
         return setting(rack.config, f"{meant.label}={given}")[1]
 
-    return Variable(VariedCommon(meant.label), accepted, kind.is_integer, kind.is_numeric)
+    return Variable(Quantity(meant.label), accepted, kind.is_integer, kind.is_numeric)
 
 
 def _tunable_hint(rack: Rack, text: str) -> str | None:
-    """Return the hint that a name without its task is a tunable's; None if no task has such a tunable."""
     wanted = text.strip().upper()
     owners = [task.name for task in rack.tasks if _is_tunable(rack, task.name, wanted)]
     return (
@@ -174,7 +129,8 @@ def _tunable(rack: Rack, owner: str, name: str) -> Variable:
         except ValueError as error:
             raise UserError(f"{owner}.{error}") from None
 
-    return Variable(VariedTunable(owner, full), accepted, known[full].type is not DataType.REAL)
+    quantity = Quantity(f"{owner}.{bare_name(full)}", tunable=(owner, full))
+    return Variable(quantity, accepted, known[full].type is not DataType.REAL)
 
 
 def _plant(rack: Rack, text: str) -> Variable:
@@ -189,4 +145,4 @@ def _plant(rack: Rack, text: str) -> Variable:
             raise UserError(f"{found.label} = {value:.10g} lies outside {found.low:.10g} to {found.high:.10g}")
         return value
 
-    return Variable(VariedPlant(found), accepted, found.is_whole)
+    return Variable(Quantity(found.label, plant=found), accepted, found.is_whole)
