@@ -48,7 +48,7 @@ class DrivenBlock:
         self._rest = self._come_to_rest()
         self._start = dict(self._instance.state)
         inner = self.integrator = dynamics.integrator
-        self._bounds = _bounds(inner, inputs, self._instance.coefficients)
+        self._bounds = _Bounds(inner, inputs, self._instance.coefficients)
         self._inner = None if inner is None else self._instance.results.index(inner.state)
         self.begin()
 
@@ -119,7 +119,6 @@ class DrivenBlock:
         return found
 
     def _notice(self, found: list[int], least: float, most: float) -> None:
-        """Record the limits that a run reached."""
         if not found:
             return
         bounds = self._bounds
@@ -141,7 +140,9 @@ class DrivenBlock:
 class _Bounds:
     """The limits of a block: of its output, and of its integrator if that is limited."""
 
-    def __init__(self, inputs: Mapping[str, Value]) -> None:
+    def __init__(
+        self, integrator: Integrator | None, inputs: Mapping[str, Value], coefficients: Mapping[str, float]
+    ) -> None:
         self.high = int(inputs.get("LIMIT_PLUS", INT16_MAX))
         self.low = int(inputs.get("LIMIT_MINUS", INT16_MIN))
         self.high_name = f"LIMIT_PLUS {self.high}" if self.high < INT16_MAX else "16 bits"
@@ -149,21 +150,15 @@ class _Bounds:
         self.inner: tuple[float, float] | None = None
         self.inner_names = ("", "")
         self.most_change = max(0, int(inputs.get("MAX_CHANGE", _ANY_CHANGE)))
-
-
-def _bounds(integrator: Integrator | None, inputs: Mapping[str, Value], coefficients: Mapping[str, float]) -> _Bounds:
-    bounds = _Bounds(inputs)
-    if integrator is None:
-        return bounds
-    span = coefficients["span"] if integrator.rate is not None else math.inf
-    bounds.inner = (max(-span, float(bounds.low)), min(span, float(bounds.high)))
-    name = f"the integrator's range +-{span:.0f} (section 51)"
-    short = span < INT16_MAX
-    bounds.inner_names = (
-        name if short and bounds.low < -span else bounds.low_name,
-        name if short and bounds.high > span else bounds.high_name,
-    )
-    return bounds
+        if integrator is not None:
+            span = coefficients["span"] if integrator.rate is not None else math.inf
+            self.inner = (max(-span, float(self.low)), min(span, float(self.high)))
+            name = f"the integrator's range +-{span:.0f} (section 51)"
+            short = span < INT16_MAX
+            self.inner_names = (
+                name if short and self.low < -span else self.low_name,
+                name if short and self.high > span else self.high_name,
+            )
 
 
 def _divided(block: Block, carrier: str, parameters: Mapping[str, Value]) -> tuple[dict[str, Value], dict[str, Value]]:

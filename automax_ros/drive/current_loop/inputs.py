@@ -84,6 +84,13 @@ class Inputs(NamedTuple):
 
 
 INPUTS: Final = tuple(name.upper() for name in Inputs._fields)
+AT_REST: Final = Inputs(
+    io_cntl_slot=0, dig_io_slot=0, ac_line_freq=60, reference=0, ref_rate=0.0, ref_lag=200.0, kp=0.0, pi_w_lead=10.0,
+    ag_factor=1, cc_thresh=0, cml_run=False, cml_coast_stop=False, mcr_select=False, max_m_dropout=0.1, cml_test=False,
+    test_brpol=False, test_alpha=180, ioc_thresh=400, lim_bar=100, digital_tach=True, speed_fdbk=None,
+    tach_loss_stop=True, osv_fdbk=None, osv_thresh=0, nonstand_phrot=False, auto_phrot=False, fault_reset=False,
+)  # fmt: skip
+"""The inputs of a drive that is not to run."""
 
 
 @lru_cache(maxsize=64)
@@ -106,7 +113,6 @@ class Latched(Stateful):
     )  # fmt: skip
 
     def __init__(self) -> None:
-        """Create the inputs with zeros, which are in force until a good value is read."""
         self.usable = True
         self.ac_line_freq = 60
         self.reference = 0

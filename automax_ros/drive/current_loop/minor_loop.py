@@ -66,7 +66,6 @@ class CurrentMinorLoop(Stateful):
     _kept = ("_started", "_tick")
 
     def __init__(self, *, tests_scrs: bool = False) -> None:
-        """Create the loop as before task initialisation."""
         self._tests_scrs = tests_scrs
         self.restart()
 
@@ -97,16 +96,13 @@ class CurrentMinorLoop(Stateful):
         return latched.osv_thresh if latched.digital_tach and latched.usable else 0
 
     def scan(self, now_ns: int, measured: Measured, inputs: Inputs) -> Outcome:
-        """Execute one scan at an interrupt.
-
-        Args:
-            now_ns: its instant, ns of rack time.
-            measured: the measurements of the 57C406.
-            inputs: the values that the task has latched.
-        """
+        """Execute one scan at an interrupt."""
         first = not self._started
-        problems = self._start(inputs) if first else []
+        problems: list[int] = []
         if first:
+            self._started = True
+            problems = self.latched.start(inputs)
+            self.pll.start(self.latched.ac_line_freq)
             measured = measured._replace(**_REGISTERS)
         pll, sequence = self.pll, self.sequence
         pll.follow(measured)
@@ -117,7 +113,8 @@ class CurrentMinorLoop(Stateful):
         if ticked:
             problems += self._read(measured, inputs)
         self.control.feed_back(measured, self.latched.lim_bar, pll.period_ns)
-        verdict = self._judge(measured) if sequence.phase is _SCR_TEST else GO_ON
+        testing = sequence.phase is _SCR_TEST
+        verdict = self.scr_test.judge(measured, reverse=_reverse(measured)) if testing else GO_ON
         causes = self.faults.causes(measured, inputs, self.latched, pll, running=sequence.phase >= _RUN)
         problems += self._protect(measured, causes, verdict)
         if ticked:
@@ -133,24 +130,12 @@ class CurrentMinorLoop(Stateful):
         told = tuple(problems) if problems else ()
         return _new(Outcome, (_new(Command, values), row, self._record(pulses), told, first))
 
-    def _start(self, inputs: Inputs) -> list[int]:
-        """Initialise the task; return the problems to log."""
-        self._started = True
-        problems = self.latched.start(inputs)
-        self.pll.start(self.latched.ac_line_freq)
-        return problems
-
     def _read(self, measured: Measured, inputs: Inputs) -> list[int]:
-        """Read the inputs of a tick; return the problems to log."""
         problems = self.latched.always(inputs) + self.latched.ratio(measured.phase_step, measured.period_step)
         if self.sequence.running:
             return problems + self.latched.run(inputs, self.pll.period_ns)
         self.latched.standby(inputs, measured.options)
         return problems
-
-    def _judge(self, measured: Measured) -> int:
-        """Return the result of the shorted SCR test."""
-        return self.scr_test.judge(measured, reverse=_reverse(measured))
 
     def _protect(self, measured: Measured, causes: int, verdict: int) -> list[int]:
         """Latch faults; coast on a fault, without the permissive, or by CML_COAST_STOP; return the problems to log."""
@@ -196,7 +181,6 @@ class CurrentMinorLoop(Stateful):
         return problems
 
     def _fire(self, measured: Measured) -> tuple[Pulse, ...]:
-        """Plan the gates up to the next interrupt, by the regulator or the test in use."""
         pll, latched, phase, control = self.pll, self.latched, self.sequence.phase, self.control
         reverse = _reverse(measured)
         if phase < _RUN:
@@ -219,7 +203,6 @@ class CurrentMinorLoop(Stateful):
         return pulses
 
     def _row(self, measured: Measured) -> tuple[int, ...]:
-        """Return the outputs of a tick."""
         outputs, status = self.outputs, measured.status
         outputs.dc_cml_state = self.sequence.running
         outputs.sync_locked = self.pll.locked
@@ -266,12 +249,10 @@ class CurrentMinorLoop(Stateful):
 
 
 def _reverse(measured: Measured) -> bool:
-    """Return whether the SCRs are fired in the order of the non-standard rotation: as the line rotates."""
     return bool(measured.status & ROTATION_ABC)
 
 
 def _like(old: object, number: float) -> object:
-    """Return a number as the type that an attribute has."""
     if isinstance(old, Phase):
         return Phase(int(number))
     return type(old)(number) if isinstance(old, (bool, int, float)) else number

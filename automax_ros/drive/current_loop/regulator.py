@@ -73,8 +73,7 @@ class ReferenceChain(Stateful):
     _kept = ("rate_out", "lag_out")
 
     def __init__(self) -> None:
-        """Create the chain at 0."""
-        self.rate_out = self.lag_out = 0.0
+        self.begin()
 
     def begin(self) -> None:
         """Start at 0 again."""
@@ -117,7 +116,6 @@ class Regulator(Stateful):
     _kept = ("integral_us", "push_us", "delta_us", "before_us", "raised", "fdbk_gain", "integral_gain")
 
     def __init__(self) -> None:
-        """Create the regulator at DELTA 0."""
         self.late = self.missed = False
         self.begin(0.0)
         self.fdbk_gain = self.integral_gain = 0
@@ -219,7 +217,6 @@ class Regulator(Stateful):
         self.delta_us = lowest_us if delta < lowest_us else highest_us if delta > highest_us else delta
 
     def _move(self, gain: float, move_us: float, lowest_us: float, highest_us: float) -> None:
-        """Move the integrator, and compute DELTA between two bounds."""
         shown = int(gain * STEPS + 0.5)
         self.integral_gain = shown if shown < LARGEST_GAIN else LARGEST_GAIN
         integral = self.integral_us + move_us

@@ -210,7 +210,6 @@ def _line_harmonic(plant: DrivePlant, values: Numbers) -> None:
 
 
 def _disturbed(plant: DrivePlant, verb: str, values: Numbers) -> None:
-    """Note a disturbance in place of the previous one; one of 0 is removed."""
     forget(plant, verb)
     if values[0]:
         note(plant, " ".join([verb, *(f"{value:g}" for value in values)]))
@@ -312,23 +311,14 @@ def _blow_fuse(plant: DrivePlant, values: Numbers) -> None:
 
 
 def _lose_phase(plant: DrivePlant, values: Numbers) -> None:
-    """Open a phase upstream of everything."""
     plant.line.lose_phase(plant.now_ns, int(values[0]))
     note(plant, f"lose_phase T{int(values[0]) + 1}")
 
 
-def _lose_tach(plant: DrivePlant, _: Numbers) -> None:
-    note(plant, "lose_tach")
-
-
 def _lose_field(plant: DrivePlant, _: Numbers) -> None:
-    _field(plant, 0.0)
-    note(plant, "lose_field")
-
-
-def _field(plant: DrivePlant, voltage: float) -> None:
     assert plant.motor.field is not None
-    plant.motor.field.voltage = voltage
+    plant.motor.field.voltage = 0.0
+    note(plant, "lose_field")
 
 
 def _load(plant: DrivePlant, values: Numbers) -> None:
@@ -349,7 +339,8 @@ def _repair(plant: DrivePlant, _: Numbers) -> None:
             line.restore_phase(plant.now_ns, _TERMINALS[terminal])
         elif verb == "blow_fuse":
             circuit.close_phase(_TERMINALS[terminal])
-    _field(plant, 1.0)
+    assert plant.motor.field is not None
+    plant.motor.field.voltage = 1.0
     mend_line(plant)
     plant.notes.clear()
 
@@ -359,7 +350,7 @@ VERBS: Mapping[str, PlantVerb] = {
     "open_gate": PlantVerb(_SCR, one_of(_SCRS), _open_gate),
     "blow_fuse": PlantVerb(_PHASE, one_of(_TERMINALS), _blow_fuse),
     "lose_phase": PlantVerb(_PHASE, one_of(_TERMINALS), _lose_phase),
-    "lose_tach": PlantVerb("true", one_of(_YES), _lose_tach),
+    "lose_tach": PlantVerb("true", one_of(_YES), lambda plant, _: note(plant, "lose_tach")),
     "lose_field": PlantVerb("true", one_of(_YES), _lose_field),
     **LINE_VERBS,
     "load_torque_nm": PlantVerb("N m, -1e6 to 1e6", in_ranges(_TORQUE), _load),

@@ -19,7 +19,7 @@ from automax_ros.drive.base.sensors import Resolver
 from automax_ros.drive.base.state import SavedState, Stateful, check_names
 from automax_ros.drive.current_loop import proposals
 from automax_ros.drive.current_loop.faults import BAD_SCR, EXT_IET, IOC, PHROT, SYNC_LOSS
-from automax_ros.drive.current_loop.inputs import Inputs
+from automax_ros.drive.current_loop.inputs import AT_REST, Inputs
 from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
 from automax_ros.drive.current_loop.sequence import Phase
 from automax_ros.drive.current_loop.signals import (
@@ -187,11 +187,7 @@ class Pmi(Stateful):
         return super().state() | {"loop": self.loop.numbers(), "firing": self._controller.state()}
 
     def restore(self, state: SavedState) -> None:
-        """Restore a state.
-
-        Raises:
-            ParameterError: it is not the state of a PMI.
-        """
+        """Restore a state; raises ParameterError if it is not the state of a PMI."""
         check_names("PMI", state, (*self._kept, "loop", "firing"))
         super().restore({name: state[name] for name in self._kept})
         try:
@@ -224,45 +220,21 @@ class Pmi(Stateful):
 
 
 def inputs_of(plant: DrivePlant, ratio: int) -> Inputs:
-    """Return the inputs of a PMI's loop at rest: the drive's parameters.
-
-    Args:
-        plant: the PMI's plant.
-        ratio: Motor Overload Ratio, %.
-    """
+    """Return the inputs of a PMI's loop at rest: the drive's parameters; ``ratio``: Motor Overload Ratio, %."""
     data = plant.data
     circuit = proposals.circuit_of(data.parameters, ratio, source_ohm=data.resistance_ohm)
-    return Inputs(
-        io_cntl_slot=0,
-        dig_io_slot=0,
+    return AT_REST._replace(
         ac_line_freq=round(data.parameters.line_hz),
-        reference=0,
-        ref_rate=0.0,
         ref_lag=float(proposals.ref_lag(circuit)),
         kp=proposals.kp(circuit),
         pi_w_lead=float(proposals.pi_w_lead(circuit)),
         ag_factor=proposals.ag_factor(circuit),
         cc_thresh=proposals.cc_thresh(circuit),
-        cml_run=False,
-        cml_coast_stop=False,
-        mcr_select=False,
         max_m_dropout=DROPOUT_S,
-        cml_test=False,
-        test_brpol=False,
-        test_alpha=180,
         ioc_thresh=min(HIGHEST_TRIP, ratio + TRIP_ABOVE),
         lim_bar=ratio,
-        digital_tach=True,
-        speed_fdbk=None,
-        tach_loss_stop=True,
-        osv_fdbk=None,
-        osv_thresh=0,
-        nonstand_phrot=False,
-        auto_phrot=False,
-        fault_reset=False,
     )
 
 
 def _limited(number: float) -> int:
-    """Return a number rounded and limited to the range of a register."""
     return round(max(-_WORD, min(_WORD, number)))

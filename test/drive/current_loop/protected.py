@@ -2,18 +2,16 @@
 
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.drive.base.nameplate import EXAMPLES, derive
-from automax_ros.drive.current_loop.inputs import Inputs
+from automax_ros.drive.current_loop.inputs import AT_REST
 from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
 from automax_ros.drive.current_loop.outputs import OUTPUTS
 from automax_ros.drive.current_loop.signals import PERMISSIVE
 from automax_ros.drive.plant.controller import DriveController
 from automax_ros.drive.plant.plant import DrivePlant, PlantData
 
-INPUTS = Inputs(
-    io_cntl_slot=7, dig_io_slot=8, ac_line_freq=60, reference=0, ref_rate=0.0, ref_lag=400.0, kp=0.2, pi_w_lead=50.0,
-    ag_factor=20, cc_thresh=680, cml_run=False, cml_coast_stop=False, mcr_select=False, max_m_dropout=0.1,
-    cml_test=False, test_brpol=False, test_alpha=180, ioc_thresh=250, lim_bar=150, digital_tach=True, speed_fdbk=None,
-    tach_loss_stop=True, osv_fdbk=None, osv_thresh=0, nonstand_phrot=False, auto_phrot=False, fault_reset=False,
+INPUTS = AT_REST._replace(
+    io_cntl_slot=7, dig_io_slot=8, ref_lag=400.0, kp=0.2, pi_w_lead=50.0, ag_factor=20, cc_thresh=680, ioc_thresh=250,
+    lim_bar=150,
 )  # fmt: skip
 LOCKED_S = 0.5
 """Long enough for the line sync to lock."""
@@ -36,17 +34,16 @@ class Drive:
         self.inputs = inputs(**changes)
         self.status = PERMISSIVE
         self.registers = (109, 4, 2, 0)
-        self.now_ns = 0
+        self.now_ns = self.late_ns = 0
         self.rows = []
         self.records = []
         self.log = []
-        self.scans = 0
 
     def scan(self):
         """Execute a scan, let time pass to the next interrupt, return the outcome."""
-        measured = self.hardware.measure(self.now_ns, self.status, self.registers)
-        outcome = self.loop.scan(self.now_ns, measured, self.inputs)
-        self.hardware.command(outcome.command, self.now_ns)
+        self.measured = self.hardware.measure(self.now_ns, self.status, self.registers)
+        outcome = self.loop.scan(self.now_ns, self.measured, self.inputs)
+        self.hardware.command(outcome.command, self.now_ns, self.now_ns + self.late_ns)
         if outcome.outputs is not None:
             self.rows.append((self.now_ns, dict(zip(OUTPUTS, outcome.outputs, strict=True))))
         if outcome.record is not None:
@@ -55,7 +52,6 @@ class Drive:
             assert f"AMX{number}" in PROBLEMS
             self.log.append((self.now_ns, f"AMX{number}"))
         self.now_ns += outcome.command.next_ns
-        self.scans += 1
         return outcome
 
     def run(self, seconds, **changes):
