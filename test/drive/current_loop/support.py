@@ -4,11 +4,9 @@ from dataclasses import dataclass, replace
 
 from automax_ros.drive.base.nameplate import EXAMPLES, derive
 from automax_ros.drive.current_loop import proposals
-from automax_ros.drive.current_loop.inputs import Inputs
-from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
-from automax_ros.drive.current_loop.signals import PERMISSIVE, Command, Measured
-from automax_ros.drive.plant.controller import DriveController
+from automax_ros.drive.current_loop.signals import Command, Measured
 from automax_ros.drive.plant.plant import DrivePlant, PlantData
+from drive.current_loop.protected import INPUTS, Drive
 
 LIM_BAR = 150
 HELD = 1e6
@@ -22,16 +20,16 @@ def parameters_of(size="150hp", hertz=60):
 def inputs_of(parameters, lim_bar=LIM_BAR, **changes):
     """Inputs with the gains that are proposed for a motor, and no reference."""
     circuit = proposals.circuit_of(parameters, lim_bar)
-    given = {
-        "io_cntl_slot": 7, "dig_io_slot": 8, "ac_line_freq": round(parameters.line_hz), "reference": 0, "ref_rate": 0.0,
-        "ref_lag": float(proposals.ref_lag(circuit)), "kp": proposals.kp(circuit),
-        "pi_w_lead": float(proposals.pi_w_lead(circuit)), "ag_factor": proposals.ag_factor(circuit),
-        "cc_thresh": proposals.cc_thresh(circuit), "cml_run": False, "cml_coast_stop": False, "mcr_select": False,
-        "max_m_dropout": 0.1, "cml_test": False, "test_brpol": False, "test_alpha": 180, "ioc_thresh": 250,
-        "lim_bar": lim_bar, "digital_tach": True, "speed_fdbk": None, "tach_loss_stop": True, "osv_fdbk": None,
-        "osv_thresh": 0, "nonstand_phrot": False, "auto_phrot": False, "fault_reset": False,
-    }  # fmt: skip
-    return Inputs(**given | changes)
+    return INPUTS._replace(
+        ac_line_freq=round(parameters.line_hz),
+        ref_lag=float(proposals.ref_lag(circuit)),
+        kp=proposals.kp(circuit),
+        pi_w_lead=float(proposals.pi_w_lead(circuit)),
+        ag_factor=proposals.ag_factor(circuit),
+        cc_thresh=proposals.cc_thresh(circuit),
+        lim_bar=lim_bar,
+        **changes,
+    )
 
 
 @dataclass
@@ -48,7 +46,7 @@ class Scan:
     problems: tuple[int, ...]
 
 
-class Bench:
+class Bench(Drive):
     """A drive that runs; ``scans`` keeps every scan."""
 
     def __init__(
@@ -69,16 +67,11 @@ class Bench:
         if inductance_h is not None:
             motor = replace(self.parameters.motor, inductance_h=inductance_h)
             self.parameters = replace(self.parameters, motor=motor)
+        plant = DrivePlant(PlantData(self.parameters, inertia=inertia), energy=energy)
+        super().__init__(plant=plant, tests_scrs=tests_scrs)
         self.late_ns = late_ns
-        self.plant = DrivePlant(PlantData(self.parameters, inertia=inertia), energy=energy)
-        self.hardware = DriveController(self.plant)
-        self.loop = CurrentMinorLoop(tests_scrs=tests_scrs)
         self.inputs = inputs_of(self.parameters, lim_bar, **inputs)
-        self.status = PERMISSIVE
-        self.registers = (109, 4, 2, 0)
-        self.now_ns = 0
         self.scans = []
-        self.outputs = ()
 
     def set(self, **inputs):
         """Change inputs."""
@@ -90,26 +83,15 @@ class Bench:
 
     def scan(self):
         """Execute a scan and let time pass to the next interrupt."""
-        measured = self.hardware.measure(self.now_ns, self.status, self.registers)
-        outcome = self.loop.scan(self.now_ns, measured, self.inputs)
-        self.hardware.command(outcome.command, self.now_ns, self.now_ns + self.late_ns)
-        if outcome.outputs is not None:
-            self.outputs = outcome.outputs
+        now_ns = self.now_ns
+        outcome = super().scan()
         control = self.loop.control
         made = Scan(
-            self.now_ns, measured, outcome.command, control.i_fdbk, control.chain.lag_out, control.delta_us,
+            now_ns, self.measured, outcome.command, control.i_fdbk, control.chain.lag_out, control.delta_us,
             control.bridge, outcome.problems,
         )  # fmt: skip
         self.scans.append(made)
-        self.now_ns += outcome.command.next_ns
         return made
-
-    def run(self, seconds):
-        """Execute the scans of a time; return them."""
-        before, end_ns = len(self.scans), self.now_ns + round(seconds * 1e9)
-        while self.now_ns < end_ns:
-            self.scan()
-        return self.scans[before:]
 
     def start(self):
         """Lock, close the contactor, run."""

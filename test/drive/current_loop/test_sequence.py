@@ -268,9 +268,8 @@ def test_records_are_made_while_the_loop_regulates():
     assert drive.records == []
     drive.start()
     first = len(drive.records)
-    before = drive.scans
-    drive.run(0.2)
-    assert len(drive.records) - first == drive.scans - before
+    scans = drive.run(0.2)
+    assert len(drive.records) - first == len(scans)
     feedback, wanted, _ = drive.records[-1][1]
     assert (feedback, wanted) == (drive.loop.outputs.i_fdbk, 1500)
     drive.run(0.02, cml_coast_stop=True)

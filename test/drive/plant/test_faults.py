@@ -5,19 +5,8 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.drive.base.errors import ParameterError
-from automax_ros.drive.base.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant.faults import active_faults, values_of, work_on
-from automax_ros.drive.plant.plant import DrivePlant, PlantData
-
-S = 1_000_000_000
-
-
-def plant_of() -> DrivePlant:
-    return DrivePlant(PlantData(derive(EXAMPLES["150hp"])))
-
-
-def do(plant: DrivePlant, verb: str, text: str) -> None:
-    work_on(plant, verb, values_of(verb, text))
+from automax_ros.drive.plant.faults import active_faults, values_of
+from drive.plants import S, do, plant_of
 
 
 @pytest.mark.parametrize(

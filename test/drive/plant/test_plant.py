@@ -11,17 +11,13 @@ from hypothesis import strategies as st
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.base.nameplate import EXAMPLES, derive
 from automax_ros.drive.circuit.scr import PARTNER
-from automax_ros.drive.plant.faults import VERBS, active_faults, values_of, work_on
+from automax_ros.drive.plant.faults import VERBS, active_faults, values_of
 from automax_ros.drive.plant.plant import DROP_OUT_NS, PICK_UP_NS, SCR_DROP_V, DrivePlant, LoadData, PlantData
 from automax_ros.drive.plant.signals import SIGNALS, signals_of
-from drive.plants import LOCKED, MS, S, closed, fired, plant_of
+from drive.plants import LOCKED, MS, S, closed, do, fired, plant_of
 from drive.support import repeatable
 
 RPM = pi / 30
-
-
-def do(plant, verb, text):
-    work_on(plant, verb, values_of(verb, text))
 
 
 def mean_current(plant, alpha_deg, *, bridge=1, settle_ns=S // 2, over_ns=S // 2):
