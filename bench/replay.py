@@ -92,7 +92,6 @@ def record(
 
 FORMS = (
     ("scan by scan", ReplayOptions(by_columns=False)),
-    ("by columns, in Python", ReplayOptions()),
     ("by columns, native", ReplayOptions(native=NativeForms(NativeMode.ON))),
 )
 """The ways to execute a recording again; each gives the same report."""

@@ -63,7 +63,7 @@ class ReplayOptions:
 
     Numbers that differ by at most ``tolerance`` count as equal; at most ``max_differences`` are listed in full.
 
-    ``by_columns``: where scans are uniform, thousands are executed at once, as ``native`` says, and compared. The
+    ``by_columns``: where scans are uniform and ``native`` permits it, thousands are executed at once and compared. The
     report is the same either way, so only the library has this option (decision): the tests prove it.
     """
 
@@ -246,10 +246,14 @@ class Run:
         """Process the messages of a recording up to the end of the range; return FALSE if that was reached."""
         if self._watcher is not None or not self._options.by_columns:
             return all(map(self.take, reader.messages(types=_TYPES)))
-        names = self._all_tasks
+        library = self._forms.library
+        if library is None:
+            for task in self._tasks.values():
+                self._forms.leave_in_python(task.task.compiled)
+            return all(map(self.take, reader.messages(types=_TYPES)))
         span = self._begin, self._end
-        blocks = BlockReplay(self._tasks, names, self._commons, self.take, _TYPES, span, self._forms)
-        return all(self._take_item(blocks, item) for item in message_blocks(reader, blocks.types, blocks.table_of))
+        blocks = BlockReplay(self._tasks, self._all_tasks, self._commons, self.take, _TYPES, span, self._forms, library)
+        return all(self._take_item(blocks, item) for item in message_blocks(reader, blocks.types, library.table))
 
     def _take_item(self, blocks: BlockReplay, item: MessageBlock | BagMessage) -> bool:
         if isinstance(item, BagMessage):

@@ -6,14 +6,20 @@ import io
 import random
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import lz4.frame
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Chunk
+
+from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.recordings.mcap.chunk_table import MESSAGE, ChunkTable, chunk_records, definition_at
+from automax_ros.recordings.mcap.unpacking import Buffer
 
 HEAD = struct.Struct("<BQ")
 MAGIC_BYTES = 8
@@ -209,3 +215,25 @@ def mutants(bag: Path, count: int, seed: int) -> Iterator[tuple[str, bytes, byte
         else:
             change = CHANGES[number % len(CHANGES)]
             yield f"{number} {change.__name__}", bytes(change(bytearray(data), chance)), text
+
+
+def table_of(data: Buffer, ends: Sequence[int]) -> ChunkTable | None:
+    """The table of the messages of unpacked chunks, found record by record; None with a record of another kind."""
+    found: list[tuple[int, int, int, int, int]] = []
+    definitions = []
+    try:
+        for begin, end in pairwise((0, *ends)):
+            for opcode, start, stop in chunk_records(data[begin:end]):
+                place = begin + start - RECORD_HEAD.size
+                if opcode == MESSAGE:
+                    channel, _, log_time, stamp = MESSAGE_FIELDS.unpack_from(data, begin + start)
+                    found.append((channel, place, stop - start - MESSAGE_FIELDS.size, log_time, stamp))
+                else:
+                    definitions.append(definition_at(data, place))
+    except (ValueError, struct.error):
+        return None
+    if not found:
+        return None
+    columns = zip(*found, strict=True)
+    kinds = (np.int64, np.int64, np.int64, np.uint64, np.uint64)
+    return ChunkTable(*map(np.array, columns, kinds), tuple(definitions))

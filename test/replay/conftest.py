@@ -1,7 +1,6 @@
 """Each replay of these tests runs both ways, by columns and scan by scan: reports and errors are the same.
 
-By columns it runs with the library of ``columns.c`` where there is a compiler; the tests of ``columns/`` run it without
-too, by NumPy alone.
+By columns it runs with the library of ``columns.c``; without a compiler both ways are scan by scan.
 """
 
 from dataclasses import replace

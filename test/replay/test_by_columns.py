@@ -16,7 +16,6 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.messages.types.messages import CommonWrite, Scan, TaskState, Values
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.write.recorder import RecordingOptions
-from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.stretch import TaskStretches
 from automax_ros.replay.engine import Replay, ReplayOptions
 from replay.replays import SPEED, YAML, recorded, rewritten
@@ -38,12 +37,9 @@ CALM = """\
 """
 
 
-@pytest.fixture(autouse=True, params=["C", "NumPy"])
-def columns_by(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, column_library, both_ways) -> None:
-    """By columns each test runs twice: by the library of ``columns.c``, and by NumPy alone."""
-    if request.param == "NumPy":
-        monkeypatch.setattr(ColumnForms, "library", None)
-    elif column_library is None:
+@pytest.fixture(autouse=True)
+def columns_are_available(column_library) -> None:
+    if column_library is None:
         pytest.skip("there is no C compiler")
 
 

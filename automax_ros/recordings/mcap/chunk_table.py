@@ -1,12 +1,10 @@
-"""Unpacked chunks whose messages are found by the index after the chunk, without reading them one by one.
+"""Unpacked chunks, the tables of their messages, and their records one by one.
 
-The index is not trusted: it is used only if its messages and the chunk's own definitions fill the chunk without gaps.
 The chunks of a block are unpacked one after the other into a buffer of a few megabytes.
 """
 
 from __future__ import annotations
 
-import struct
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -45,20 +43,6 @@ class BlockBuffer:
         return self._given.popleft()
 
 
-_INDEX_HEAD = struct.Struct("<HI")
-"""Beginning of a message index's content: channel, and bytes of the entries."""
-_ENTRY = np.dtype([("log_time", "<u8"), ("place", "<u8")])
-_HEAD = np.dtype(
-    [
-        ("opcode", "u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-    ]
-)
-"""Beginning of a message's record."""
 MESSAGE_HEAD = RECORD_HEAD.size + MESSAGE_FIELDS.size
 """Bytes of a record before the message itself."""
 Definition = tuple[int, int, bytes]
@@ -69,7 +53,6 @@ MESSAGE = int(Opcode.MESSAGE)
 FIRST_PRIVATE_OPCODE = 0x80
 """First private opcode; readers skip records that they do not know."""
 _IN_CHUNK = DEFINITIONS | {MESSAGE}
-_MOST_DEFINITIONS = 10_000
 MOST_MESSAGES = 400_000
 """The messages of a chunk with more than this are read one by one (decision: a bound on memory for untrusted
 recordings)."""
@@ -96,7 +79,7 @@ class ChunkTable:
 
 
 class WholeChunk:
-    """The unpacked bytes of a chunk, which ends at ``place`` in the file, and the indexes that follow it.
+    """The unpacked bytes of a chunk, which ends at ``place`` in the file.
 
     Of a damaged file: ``packed`` is the chunk as stored, None if ``data`` was recovered of one that the file has only
     in part; ``cut``: there was more than that.
@@ -104,61 +87,6 @@ class WholeChunk:
 
     def __init__(self, data: Buffer, place: int = 0, packed: Chunk | None = None, *, cut: bool = False) -> None:
         self.data, self.place, self.packed, self.cut = data, place, packed, cut
-        self._indexes: list[bytes] | None = []
-        self._left = len(data) // MESSAGE_HEAD * _ENTRY.itemsize
-        """Most bytes that further entries can have."""
-
-    def add_index(self, content: bytes) -> None:
-        """Add the content of a message index; one that cannot be that of the chunk invalidates all of them."""
-        if self._indexes is None or len(content) < _INDEX_HEAD.size:
-            self._indexes = None
-            return
-        _, size = _INDEX_HEAD.unpack_from(content)
-        self._left -= size
-        if size != len(content) - _INDEX_HEAD.size or size % _ENTRY.itemsize or self._left < 0:
-            self._indexes = None
-        elif size:
-            self._indexes.append(content)
-
-    def table(self) -> ChunkTable | None:
-        """Return the table of the messages; None if the indexes do not account for every byte of the chunk."""
-        if not self._indexes or sum(map(len, self._indexes)) > MOST_MESSAGES * _ENTRY.itemsize:
-            return None
-        parts = [np.frombuffer(content, _ENTRY, offset=_INDEX_HEAD.size)["place"] for content in self._indexes]
-        told = np.sort(np.concatenate(parts))
-        if told[-1] > len(self.data) - MESSAGE_HEAD:
-            return None
-        places = told.astype(np.int64)
-        found = np.ndarray((len(self.data) - MESSAGE_HEAD + 1,), f"V{MESSAGE_HEAD}", self.data, strides=(1,))
-        heads = found[places].view(_HEAD)
-        lengths = heads["length"]
-        if (heads["opcode"] != MESSAGE).any() or (lengths < MESSAGE_FIELDS.size).any():
-            return None
-        if (lengths > len(self.data)).any():
-            return None
-        ends = places + RECORD_HEAD.size + lengths.astype(np.int64)
-        begins = np.append(places, len(self.data))
-        known = np.concatenate(([0], ends))
-        if (known > begins).any():
-            return None
-        gaps = np.flatnonzero(known < begins)
-        definitions: list[Definition] = []
-        try:
-            for begin, end in zip(known[gaps].tolist(), begins[gaps].tolist(), strict=True):
-                for opcode, start, _ in chunk_records(self.data[begin:end]):
-                    if opcode == MESSAGE or len(definitions) == _MOST_DEFINITIONS:
-                        return None
-                    definitions.append(definition_at(self.data, begin + start - RECORD_HEAD.size))
-        except ValueError:
-            return None
-        return ChunkTable(
-            heads["channel"].astype(np.int64),
-            places,
-            lengths.astype(np.int64) - MESSAGE_FIELDS.size,
-            heads["log_time"].copy(),
-            heads["publish_time"].copy(),
-            tuple(definitions),
-        )
 
 
 def chunk_records(data: Buffer) -> Iterator[tuple[int, int, int]]:

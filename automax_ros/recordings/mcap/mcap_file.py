@@ -43,7 +43,6 @@ TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag
 
 _KNOWN = frozenset(map(int, Opcode))
 _ENDS = frozenset({int(Opcode.DATA_END), int(Opcode.FOOTER)})
-_NOTHING: frozenset[int] = frozenset()
 _INDEXES = frozenset({int(Opcode.MESSAGE_INDEX)})
 _MESSAGES = _INDEXES | {int(Opcode.CHUNK), MESSAGE}
 _SUMMARY = frozenset(range(256)) - {int(Opcode.FOOTER)}
@@ -121,35 +120,20 @@ class McapFile:
             if piece is not None:
                 yield piece
 
-    def chunks(self, *, indexed: bool = True, room: Room | None = None) -> Iterator[WholeChunk | RawMessage]:
-        """Yield the chunks, unpacked, with their indexes (if ``indexed``), and the messages outside of chunks.
+    def chunks(self, room: Room) -> Iterator[WholeChunk | RawMessage]:
+        """Yield the chunks, unpacked, and the messages outside of chunks.
 
         ``room`` returns the buffer into which each chunk is unpacked, in the order of the chunks.
-        A chunk is yielded before an error in what follows it is raised. ``chunk_messages`` returns its messages.
+        ``chunk_messages`` returns the messages of a chunk.
 
         Raises:
             BagError: as ``records`` does, except for errors inside a chunk.
         """
-        pending: WholeChunk | None = None
-        parts = self._parts(_NOTHING if indexed else _INDEXES)
-        while True:
-            try:
-                opcode, content = next(parts, (_END, b""))
-                piece = self._piece(opcode, content, room)
-            except BagError:
-                if pending is not None:
-                    yield pending
-                raise
-            if opcode == Opcode.MESSAGE_INDEX:
-                if pending is not None:
-                    pending.add_index(content)
-                continue
-            if pending is not None:
-                yield pending
-            pending = piece if isinstance(piece, WholeChunk) else None
-            if opcode == _END:
-                return
-            if opcode == Opcode.MESSAGE:
+        for opcode, content in self._parts(_INDEXES):
+            piece = self._piece(opcode, content, room)
+            if isinstance(piece, WholeChunk):
+                yield piece
+            elif opcode == Opcode.MESSAGE:
                 yield self._message(content)
 
     def chunk_messages(self, chunk: WholeChunk) -> Iterator[RawMessage]:

@@ -1,6 +1,6 @@
 """Reads recordings in blocks of thousands of messages, which are decoded together.
 
-The messages of a chunk whose index is incomplete are returned one by one, and so are those of other programs'
+The messages of a chunk with unexpected records are returned one by one, and so are those of other programs'
 recordings, which are not stored in the order of sending.
 """
 
@@ -71,12 +71,10 @@ class MessageBlock:
         )
 
 
-def message_blocks(
-    reader: BagReader, types: Sequence[str], table_of: TableOf | None = None
-) -> Iterator[MessageBlock | BagMessage]:
+def message_blocks(reader: BagReader, types: Sequence[str], table_of: TableOf) -> Iterator[MessageBlock | BagMessage]:
     """Yield the messages of these types in the order of sending: in blocks, or one by one.
 
-    ``table_of`` finds the messages of a chunk; without it the chunks' indexes are used.
+    ``table_of`` finds the messages of chunks.
 
     Raises:
         BagError: as ``BagReader.messages`` does, at the same message.
@@ -100,7 +98,7 @@ class _BlockFile:
     """Reads one file in blocks."""
 
     def __init__(
-        self, file: McapFile, source: DataSource, types: Sequence[str], order: FileOrder, table_of: TableOf | None
+        self, file: McapFile, source: DataSource, types: Sequence[str], order: FileOrder, table_of: TableOf
     ) -> None:
         self._file, self._source, self._order, self._table_of = file, source, order, table_of
         self._types = frozenset(types)
@@ -121,7 +119,7 @@ class _BlockFile:
     def items(self) -> Iterator[MessageBlock | BagMessage]:
         """Yield the messages of the file; those read before an error are yielded first."""
         try:
-            for record in self._file.chunks(indexed=self._table_of is None, room=self._buffer.room):
+            for record in self._file.chunks(self._buffer.room):
                 if isinstance(record, WholeChunk):
                     data, begin = self._buffer.taken()
                     if data is not self._data:
@@ -158,7 +156,7 @@ class _BlockFile:
 
     def _whole_table(self, chunks: Sequence[tuple[int, WholeChunk]]) -> ChunkTable | None:
         """Return the table of all messages of consecutive chunks; None if each chunk must be read separately."""
-        if self._table_of is None or not chunks:
+        if not chunks:
             return None
         begin = chunks[0][0]
         ends = [place - begin + len(chunk.data) for place, chunk in chunks]
@@ -166,8 +164,7 @@ class _BlockFile:
 
     def _table(self, chunk: WholeChunk) -> ChunkTable | None:
         """Return the table of the messages of a chunk; None if they must be read one by one."""
-        table = chunk.table() if self._table_of is None else self._table_of(chunk.data, [len(chunk.data)])
-        return self._admitted(table)
+        return self._admitted(self._table_of(chunk.data, [len(chunk.data)]))
 
     def _admitted(self, table: ChunkTable | None) -> ChunkTable | None:
         """Return a table if all its messages can be read, and add its definitions and times; else return None."""

@@ -15,8 +15,7 @@ import numpy as np
 from automax_ros.compile.base.scan_io import ScanTooLong, StateValues
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.types import DataType, Latched, Value, type_of_name
-from automax_ros.messages.cdr.columns import Ints
-from automax_ros.replay.columns.entries import Entries
+from automax_ros.replay.columns.entries import Entries, Ints
 from automax_ros.runtime.memory.registers import Backplane
 from automax_ros.runtime.scan.task_io import register_read, register_written
 

@@ -14,9 +14,8 @@ from automax_ros.compile.native.run.columns import BesideLatch
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms, NativeOutcome
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
-from automax_ros.messages.cdr.columns import Ints
 from automax_ros.rackfile.model.config import CommonVariable
-from automax_ros.replay.columns.entries import Entries
+from automax_ros.replay.columns.entries import Entries, Ints
 from automax_ros.replay.columns.execution import ColumnForm, Executed, PythonColumns
 from automax_ros.replay.columns.library import ColumnLibrary, library_text
 from automax_ros.runtime.memory.registers import Backplane
@@ -26,10 +25,10 @@ if TYPE_CHECKING:
         NativeTask,
     )  # it takes a tenth of a second, and only native tasks need it
 
-WORTHWHILE_NS = 600 * NS_PER_S
+WORTHWHILE_NS = 30 * NS_PER_S
 """Recorded time from which on the library of a replay by columns is built or looked for (decision).
 
-Building it takes half a second once on a machine, and saves a millisecond for each second of five tasks at 5.5 ms.
+Building it takes half a second once on a machine, and saves 25 ms for each second of five tasks at 5.5 ms.
 """
 
 
@@ -52,7 +51,7 @@ class ColumnForms:
 
     @property
     def library(self) -> ColumnLibrary | None:
-        """The machine code for the rest of a replay by columns; None where NumPy is used."""
+        """The machine code for a replay by columns; None where a replay goes scan by scan."""
         if not self._sought:
             self._sought = True
             path = self._native.library(library_text(), WORTHWHILE_NS)
@@ -60,6 +59,13 @@ class ColumnForms:
                 with contextlib.suppress(OSError):
                     self._library = ColumnLibrary(path)
         return self._library
+
+    def leave_in_python(self, compiled: CompiledTask) -> None:
+        """Note why a task is not executed by columns, and so not as machine code."""
+        outcome = self._native.form(compiled)
+        if outcome.native is not None:
+            outcome = NativeOutcome(compiled, why="a run this short gains nothing by it (--native on)")
+        self._made.setdefault(id(compiled), outcome)
 
     def form(self, compiled: CompiledTask, views: Sequence[int]) -> ColumnForm:
         """Return the form of a task that latches these views."""

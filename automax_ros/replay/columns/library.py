@@ -1,6 +1,6 @@
 """Machine code for replay by columns: ``columns.c``, built once and kept in the cache of native code.
 
-NumPy can do the same: where the library is not wanted, does not pay or cannot be built, replay is only slower.
+Where it is not wanted, does not pay or cannot be built, a replay goes scan by scan, and is only slower.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from automax_ros.messages.cdr.cdr import MAX_TRAILING
-from automax_ros.messages.cdr.columns import Bytes, Ints
 from automax_ros.messages.cdr.fields import MACROS, FieldsSource, fields_source
 from automax_ros.messages.types.messages import NAMES, CommonWrite, Scan
 from automax_ros.recordings.mcap.chunk_table import MESSAGE_HEAD, MOST_MESSAGES, ChunkTable, definition_at
 from automax_ros.recordings.mcap.unpacking import Buffer
-from automax_ros.replay.columns.entries import Entries, ValueRules
+from automax_ros.replay.columns.entries import Entries, Ints, ValueRules
+
+Bytes = NDArray[np.uint8]
 
 _MOST_DEFINITIONS = 1000
 _MOST_FIELDS = 32

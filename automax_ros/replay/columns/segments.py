@@ -11,7 +11,6 @@ from automax_ros.recordings.read.reader import BagMessage
 from automax_ros.replay.columns.entries import ValueRules
 from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.library import ColumnLibrary
-from automax_ros.replay.columns.native_messages import native_scans, native_writes
 from automax_ros.replay.columns.scans import SCAN, WRITE, ScanColumns, WriteColumns, scans_by_task, write_columns
 from automax_ros.replay.columns.stretch import TaskStretches
 from automax_ros.replay.scans.commons import RecordedCommons
@@ -38,6 +37,7 @@ class BlockReplay:
         types: Collection[str],
         span: tuple[int, int | None],
         forms: ColumnForms,
+        library: ColumnLibrary,
     ) -> None:
         """Prepare for scans of the tasks of these names; only the given ``tasks`` are executed, in these ``forms``.
 
@@ -46,10 +46,10 @@ class BlockReplay:
         self._tasks, self._names, self._commons, self._take = tasks, sorted(names), commons, take
         self._begin, self._end = span
         self._rules = ValueRules(commons.rack)
-        self._stretches = {name: TaskStretches(task, commons, self._rules, forms) for name, task in tasks.items()}
-        self._library = forms.library
-        self.table_of = None if self._library is None else self._library.table
-        """The function that finds the messages of a chunk; None: its index is used."""
+        self._stretches = {
+            name: TaskStretches(task, commons, self._rules, forms, library) for name, task in tasks.items()
+        }
+        self._library = library
         self.types = (SCAN, WRITE, *sorted({*types} - {SCAN, WRITE}))
         """The types of messages to read, in the order in which a block numbers them."""
 
@@ -116,16 +116,12 @@ class _BlockPart:
     """A block with its scans and writes as columns."""
 
     def __init__(
-        self, block: MessageBlock, names: Collection[str], run_id: int, rules: ValueRules, library: ColumnLibrary | None
+        self, block: MessageBlock, names: Collection[str], run_id: int, rules: ValueRules, library: ColumnLibrary
     ) -> None:
         self.block = block
         scans, writes = (np.flatnonzero(block.kinds == kind) for kind in (0, 1))
-        if library is None:
-            self._scans, self._strays = scans_by_task(block, scans, tuple(names), rules)
-            self.writes, self._forcing = write_columns(block, writes, run_id, rules)
-        else:
-            self._scans, self._strays = native_scans(library, block, scans, tuple(names), rules)
-            self.writes, self._forcing = native_writes(library, block, writes, run_id, rules)
+        self._scans, self._strays = scans_by_task(library, block, scans, tuple(names), rules)
+        self.writes, self._forcing = write_columns(library, block, writes, run_id, rules)
         self._modeled = {name: bool(scans.durations.any()) for name, scans in self._scans.items()}
 
     def by_themselves(self, end: int | None) -> list[int]:

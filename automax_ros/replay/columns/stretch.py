@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from automax_ros.core.types import DataType, type_of_name
-from automax_ros.messages.cdr.columns import Ints
-from automax_ros.replay.columns.entries import Entries, ValueRules, first_other
+from automax_ros.replay.columns.entries import Entries, Ints, ValueRules, first_other
 from automax_ros.replay.columns.execution import ColumnForm, Executed
 from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.library import ColumnLibrary
@@ -23,8 +22,8 @@ from automax_ros.runtime.tasks.task import Task
 class LatchedColumns:
     """Builds columns of the values that a task latched, in its order of views, from the newly latched entries."""
 
-    def __init__(self, views: Sequence[int], count: int, library: ColumnLibrary | None = None) -> None:
-        """Create the columns of the task's views; ``count`` is the rack's number of views, ``library`` is faster."""
+    def __init__(self, views: Sequence[int], count: int, library: ColumnLibrary) -> None:
+        """Create the columns of the task's views; ``count`` is the rack's number of views."""
         self._count, self._library = len(views), library
         self._positions = np.full(count, -1, np.int64)
         self._positions[list(views)] = np.arange(len(views))
@@ -40,19 +39,7 @@ class LatchedColumns:
 
     def columns(self, entries: Entries, before: Sequence[int]) -> Ints:
         """Return a row for each view with its value in each scan; ``before`` are the values before the first."""
-        if self._library is not None:
-            return self._library.latched(entries, self._positions, before)
-        count = len(entries)
-        told = self._positions[entries.views]
-        own = told >= 0
-        positions = np.concatenate((np.arange(self._count), told[own]))
-        rows = np.concatenate((np.zeros(self._count, np.int64), entries.rows[own]))
-        values = np.concatenate((np.array(before, np.int64), entries.values[own].astype(np.int64)))
-        order = np.argsort(positions, kind="stable")
-        positions, rows, values = positions[order], rows[order], values[order]
-        ends = np.append(rows[1:], count)
-        ends[np.flatnonzero(positions[1:] != positions[:-1])] = count
-        return np.repeat(values, ends - rows).reshape(self._count, count)
+        return self._library.latched(entries, self._positions, before)
 
 
 FEWEST_SCANS = 16
@@ -80,9 +67,16 @@ class TaskStretches:
     A doubtful scan counts as different: scan-by-scan replay decides about it.
     """
 
-    def __init__(self, replay: TaskReplay, commons: RecordedCommons, rules: ValueRules, forms: ColumnForms) -> None:
+    def __init__(
+        self,
+        replay: TaskReplay,
+        commons: RecordedCommons,
+        rules: ValueRules,
+        forms: ColumnForms,
+        library: ColumnLibrary,
+    ) -> None:
         self._replay, self._commons, self._rules = replay, commons, rules
-        self._forms = forms
+        self._forms, self._library = forms, library
         self._form: _Form | None = None
 
     def take(self, scans: ScanColumns, *, counted: bool) -> int:
@@ -127,7 +121,7 @@ class TaskStretches:
             self._form = _Form(
                 task,
                 self._forms.form(compiled, views),
-                LatchedColumns(views, self._rules.count, self._forms.library),
+                LatchedColumns(views, self._rules.count, self._library),
                 np.array([task.memory.view(name) for name in compiled.written], np.int64),
                 np.array([places[name] for name in compiled.written], np.int64),
                 tuple(type_of_name(name) is DataType.BOOLEAN for name in compiled.latched),
@@ -153,39 +147,19 @@ class TaskStretches:
             return 0
         scans = scans.part(0, done)
         return min(
-            self._same_commits(scans.committed, executed.outputs, latched[form.places, :done], form),
-            first_other(scans.written, executed.written, bits=True),
+            self._library.same_commits(
+                scans.committed, executed.outputs, list(latched[form.places, :done]), form.written
+            ),
+            first_other(scans.written, executed.written),
             self._same_errors(scans, executed),
         )
 
-    def _same_commits(self, recorded: Entries, outputs: list[Ints], latched: Ints, form: _Form) -> int:
-        """Return how many scans committed the same."""
-        if self._forms.library is not None:
-            return self._forms.library.same_commits(recorded, outputs, list(latched), form.written)
-        own = _commits(np.array(outputs, np.int64).reshape(-1, len(recorded)), latched, form)
-        return first_other(recorded, own, bits=False)
-
     def _same_errors(self, scans: ScanColumns, executed: Executed) -> int:
         """Return how many scans logged the same errors; in an edited task lines do not count."""
-        if not len(executed.errors) and not len(scans.errors.lines):
-            return len(scans)
-        rows, lines, codes = executed.errors.T
+        rows, lines, codes = np.ascontiguousarray(executed.errors.T)
         offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(rows, minlength=len(scans)))))
-        recorded, own = scans.errors.lines, lines
+        recorded, own = scans.errors, Entries(offsets, lines, codes, np.zeros(len(codes)))
         if self._replay.edited:
-            recorded, own = np.zeros_like(recorded), np.zeros_like(own)
-        zeros = np.zeros(max(len(codes), len(scans.errors.codes)), np.int64)
-        return first_other(
-            Entries(scans.errors.offsets, recorded, zeros, scans.errors.codes.astype(np.float64)),
-            Entries(offsets, own, zeros, codes.astype(np.float64)),
-            bits=False,
-        )
-
-
-def _commits(outputs: Ints, latched: Ints, form: _Form) -> Entries:
-    """Return the values that END wrote back: the outputs that differ from the latched values, in their order."""
-    changed = (outputs != latched).T
-    rows, numbers = np.nonzero(changed)
-    offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(rows, minlength=len(changed)))))
-    values = outputs[numbers, rows].astype(np.float64)
-    return Entries(offsets, form.written[numbers], np.zeros(len(rows), np.int64), values)
+            recorded = replace(recorded, views=np.zeros_like(recorded.views))
+            own = replace(own, views=np.zeros_like(lines))
+        return first_other(recorded, own)

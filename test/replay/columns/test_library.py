@@ -1,4 +1,4 @@
-"""What ``columns.c`` does is what NumPy and the scalar decoder do, on any bytes."""
+"""What ``columns.c`` does is what the scalar decoder does, on any bytes."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ import gc
 import random
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from recordings.mutations import CHANGES
+from recordings.mutations import CHANGES, table_of
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import NAMES, CommonWrite, Scan, ScanError, Values
@@ -23,26 +25,24 @@ from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.mcap_file import McapFile
 from automax_ros.recordings.read.blocks import MessageBlock, message_blocks
 from automax_ros.recordings.read.reader import BagMessage, BagReader, ChannelReader, DataSource
-from automax_ros.replay.columns.entries import Entries, ValueRules, first_other
+from automax_ros.replay.columns.entries import Entries, ValueRules
 from automax_ros.replay.columns.library import ColumnLibrary
-from automax_ros.replay.columns.native_messages import native_scans, native_writes
 from automax_ros.replay.columns.scans import SCAN, WRITE, scans_by_task, write_columns
 from automax_ros.replay.columns.stretch import LatchedColumns
-from automax_ros.runtime.tasks.task import OVERLAP
+from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, OVERLAP
 from replay.replays import recorded
 
 GOLDEN = Path(__file__).parents[3] / "bags" / "section_drive"
 TASKS = ("DRIVE", "LINE", "SPEED")
 RUN = (1 << 64) - 7
-RULES = ValueRules(
-    [
-        CommonVariable("A%", DataType.INTEGER),
-        CommonVariable("B@", DataType.BOOLEAN),
-        CommonVariable("C", DataType.REAL),
-        CommonVariable("D!", DataType.DOUBLE, dimensions=(3,)),
-        CommonVariable("E$", DataType.STRING),
-    ]
-)
+VARIABLES = [
+    CommonVariable("A%", DataType.INTEGER),
+    CommonVariable("B@", DataType.BOOLEAN),
+    CommonVariable("C", DataType.REAL),
+    CommonVariable("D!", DataType.DOUBLE, dimensions=(3,)),
+    CommonVariable("E$", DataType.STRING),
+]
+RULES = ValueRules(VARIABLES)
 numbers = st.sampled_from((0.0, -0.0, 1.0, -1.0, 0.5, 32767.0, 32768.0, 1e9, 1e300, float("nan"), float("inf")))
 
 
@@ -118,60 +118,104 @@ def block_of(items: list[tuple[int, bytes]]) -> MessageBlock:
     return MessageBlock(source(), data, which, which, starts, lengths, times, times)
 
 
-def told(columns, count: int) -> list[str]:
-    """What the first scans or writes are, bit for bit."""
-    parts = columns.part(0, count)
+def decoded(block: MessageBlock, places: np.ndarray) -> list[tuple[int, Any]]:
+    """The places and messages up to the first one that is malformed."""
     found = []
-    for name, part in sorted(vars(parts).items()):
-        fields = sorted(vars(part).items()) if hasattr(part, "__dataclass_fields__") else [("", part)]
-        found += [f"{name}.{field}: {column.tolist()}" for field, column in fields]
+    for place in places.tolist():
+        try:
+            found.append((place, block.message(place).message))
+        except BagError:
+            break
     return found
 
 
+def is_odd(scan: Scan) -> bool:
+    """Whether a scan must be replayed by itself."""
+    parts = scan.latched, scan.read, scan.written, scan.committed
+    timed = any(error.code in (OVERLAP, EVENT_TIMEOUT) for error in scan.errors)
+    return timed or scan.scan >= 1 << 63 or not all(map(is_possible, parts))
+
+
+def is_possible(values: Values) -> bool:
+    """Whether the variables of the rack can have the values."""
+    if values.text or not len(values.variable) == len(values.element) == len(values.value):
+        return False
+    return all(map(can_hold, values.variable, values.element, values.value))
+
+
+def can_hold(view: int, element: int, value: float) -> bool:
+    if view >= len(VARIABLES) or VARIABLES[view].type is DataType.STRING or element >= VARIABLES[view].elements:
+        return False
+    low, high = VARIABLES[view].type.range
+    return low <= value <= high and (VARIABLES[view].type is DataType.REAL or value == int(value))
+
+
+def entries_of(part: Values) -> list[str]:
+    """Numbers, elements and values in the types of their variables, with the sign of a zero."""
+    values = [value if view == 2 else value + 0.0 for view, value in zip(part.variable, part.value, strict=True)]
+    return [repr(list(column)) for column in (part.variable, part.element, values)]
+
+
+def shown(entries: Entries) -> list[str]:
+    return [repr(column.tolist()) for column in (entries.views, entries.elements, entries.values)]
+
+
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
 @given(block=blocks())
-def test_messages_are_taken_as_numpy_and_the_scalar_decoder_take_them(library, block):
-    scans = np.flatnonzero(block.kinds == 0)
-    expected, strays = scans_by_task(block, scans, TASKS, RULES)
-    found, others = native_scans(library, block, scans, TASKS, RULES)
-    end = malformed(block, scans)
-    assert [place for place in others.tolist() if place < end] == [place for place in strays.tolist() if place < end]
-    for task in TASKS:
-        own, its = found.get(task), expected.get(task)
-        count = 0 if its is None else int((its.places < end).sum())
-        assert count == (0 if own is None else int((own.places < end).sum()))
-        if own is not None and its is not None:
-            assert own.odd[:count].tolist() == its.odd[:count].tolist()
-            assert own.odd[count:].all()
-            for begin in (0, *(np.flatnonzero(its.odd[:count]) + 1).tolist()):
-                length = int(np.argmax(np.append(its.odd[begin:count], True)))
-                assert told(own.part(begin, count), length) == told(its.part(begin, count), length)
-
-
-def malformed(block: MessageBlock, places: np.ndarray) -> int:
-    """The place of the first message that is malformed."""
-    for place in places.tolist():
-        try:
-            block.message(place)
-        except BagError:
-            return int(place)
-    return len(block)
-
-
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
-@given(block=blocks())
-def test_writes_are_taken_as_numpy_and_the_scalar_decoder_take_them(library, block):
-    writes = np.flatnonzero(block.kinds == 1)
-    end = malformed(block, writes)
-    expected, forcing = write_columns(block, writes, RUN, RULES)
-    found, own_forcing = native_writes(library, block, writes, RUN, RULES)
-    assert [place for place in own_forcing.tolist() if place < end] == forcing[forcing < end].tolist()
-    good = [place for place, is_good in zip(writes.tolist(), found.good, strict=True) if is_good and place < end]
-    assert good == [
-        place for place, is_good in zip(writes.tolist(), expected.good, strict=True) if is_good and place < end
+def test_scans_are_taken_as_the_scalar_decoder_takes_them(library, block):
+    places = np.flatnonzero(block.kinds == 0)
+    expected = decoded(block, places)
+    end = expected[-1][0] + 1 if expected else 0
+    if len(expected) == len(places):
+        end = len(block)
+    found, strays = scans_by_task(library, block, places, TASKS, RULES)
+    assert [place for place in strays.tolist() if place < end] == [
+        place for place, scan in expected if scan.task not in TASKS
     ]
-    for row in np.flatnonzero(found.good & (writes < end)).tolist():
-        assert told(found.part(row, row + 1), 1) == told(expected.part(row, row + 1), 1)
+    for task in TASKS:
+        scans = [(place, scan) for place, scan in expected if scan.task == task]
+        own = found.get(task)
+        if own is None:
+            assert not scans
+            continue
+        assert own.places[own.places < end].tolist() == [place for place, _ in scans]
+        assert own.odd[len(scans) :].all()
+        assert own.odd[: len(scans)].tolist() == [is_odd(scan) for _, scan in scans]
+        for row, (_, scan) in enumerate(scans):
+            if own.odd[row]:
+                continue
+            one = own.part(row, row + 1)
+            numbers = [column.tolist() for column in (one.stamps, one.scans, one.durations, one.full)]
+            assert numbers == [[scan.stamp], [scan.scan], [scan.duration_ns], [scan.full]]
+            for entries, part in zip(
+                (one.latched, one.read, one.written, one.committed),
+                (scan.latched, scan.read, scan.written, scan.committed),
+                strict=True,
+            ):
+                assert shown(entries) == entries_of(part)
+            errors = list(zip(one.errors.views.tolist(), one.errors.elements.tolist(), strict=True))
+            assert errors == [(error.line, error.code) for error in scan.errors]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
+@given(block=blocks())
+def test_writes_are_taken_as_the_scalar_decoder_takes_them(library, block):
+    places = np.flatnonzero(block.kinds == 1)
+    expected = decoded(block, places)
+    found, forcing = write_columns(library, block, places, RUN, RULES)
+    end = len(block) if len(expected) == len(places) else (expected[-1][0] + 1 if expected else 0)
+    forces = [place for place, write in expected if write.kind in (WriteKind.FORCE, WriteKind.RELEASE)]
+    assert [place for place in forcing.tolist() if place < end] == forces
+    before = None
+    for row, (place, write) in enumerate(expected):
+        follows = before is None or write.sequence == before + 1
+        own = write.run_id == RUN and write.sequence < (1 << 63) - 1
+        assert found.good[row] == (own and follows and place not in forces and is_possible(write.values))
+        before = write.sequence
+        if found.good[row]:
+            one = found.part(row, row + 1)
+            assert one.sequences.tolist() == [write.sequence]
+            assert shown(one.entries) == entries_of(write.values)
 
 
 @st.composite
@@ -188,14 +232,22 @@ def lists(draw, count: int) -> Entries:
 @given(data=st.data(), views=st.permutations((0, 2, 3)), count=st.integers(1, 30))
 def test_latched_values_hold_until_the_next_ones(library, data, views, count):
     entries = data.draw(lists(count))
-    before = [7, -8, 9]
-    expected = LatchedColumns(views, 5).columns(entries, before)
-    assert LatchedColumns(views, 5, library).columns(entries, before).tolist() == expected.tolist()
+    now, expected = dict(zip(views, (7, -8, 9), strict=True)), []
+    for scan in range(count):
+        part = entries.part(scan, scan + 1)
+        now.update((view, int(value)) for view, value in zip(part.views.tolist(), part.values, strict=True))
+        expected.append([now[view] for view in views])
+    assert LatchedColumns(views, 5, library).columns(entries, [7, -8, 9]).T.tolist() == expected
+
+
+def committed(entries: Entries, scan: int) -> list[list[float]]:
+    part = entries.part(scan, scan + 1)
+    return [part.views.tolist(), part.values.tolist()]
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
 @given(data=st.data(), count=st.integers(1, 20))
-def test_commits_are_compared_as_numpy_compares_them(library, data, count):
+def test_the_first_other_commit_is_found(library, data, count):
     views = np.array([3, 1], np.int64)
     column = st.lists(st.integers(0, 2), min_size=count, max_size=count)
     latched, outputs = ([np.array(data.draw(column), np.int64) for _ in views] for _ in range(2))
@@ -212,14 +264,15 @@ def test_commits_are_compared_as_numpy_compares_them(library, data, count):
         values[data.draw(st.integers(0, len(values) - 1))] += data.draw(st.sampled_from((0.0, 0.5, 1.0)))
         recorded = Entries(own.offsets, own.views, own.elements, values)
     same = library.same_commits(recorded, outputs, latched, views)
-    assert same == first_other(recorded, own, bits=False)
+    assert same == next((k for k in range(count) if committed(recorded, k) != committed(own, k)), count)
     assert recorded is not own or same == count
 
 
-def test_chunks_are_taken_apart_as_their_indexes_tell(library):
-    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk)]
+def test_chunks_are_taken_apart_record_by_record(library):
+    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).pieces() if isinstance(item, WholeChunk)]
     for chunk in chunks:
-        expected, found = chunk.table(), library.table(chunk.data, [len(chunk.data)])
+        ends = [len(chunk.data)]
+        expected, found = table_of(chunk.data, ends), library.table(chunk.data, ends)
         assert expected is not None
         assert found.definitions == expected.definitions
         for name in ("numbers", "places", "starts", "lengths", "log_times", "stamps"):
@@ -229,7 +282,7 @@ def test_chunks_are_taken_apart_as_their_indexes_tell(library):
 
 
 def test_chunks_that_follow_each_other_are_taken_apart_at_once(library):
-    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk)][:5]
+    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).pieces() if isinstance(item, WholeChunk)][:5]
     data = b"".join(chunk.data for chunk in chunks)
     ends = np.cumsum([len(chunk.data) for chunk in chunks]).tolist()
     tables = [library.table(chunk.data, [len(chunk.data)]) for chunk in chunks]
@@ -249,7 +302,7 @@ def test_chunks_that_follow_each_other_are_taken_apart_at_once(library):
 
 def test_many_chunks_are_taken_apart_whatever_memory_is_given_back_meanwhile(library, monkeypatch):
     """The ends of 128 chunks and more stand in memory of malloc's, which gives it to the next who asks."""
-    whole = (item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk))
+    whole = (item for item in McapFile(next(GOLDEN.glob("*.mcap"))).pieces() if isinstance(item, WholeChunk))
     chunk = min(whole, key=lambda item: len(item.data))
     data = bytes(chunk.data) * 300
     ends = [len(chunk.data) * number for number in range(1, 301)]
@@ -264,11 +317,11 @@ def test_many_chunks_are_taken_apart_whatever_memory_is_given_back_meanwhile(lib
     monkeypatch.setattr(ColumnLibrary, "_count", counted)
     found = library.table(data, ends)
     assert found is not None
-    assert len(found.places) == 300 * len(chunk.table().places)
+    assert len(found.places) == 300 * len(table_of(chunk.data, [len(chunk.data)]).places)
 
 
 def test_other_records_and_cut_off_ones_are_left_to_the_reader(library):
-    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk)]
+    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).pieces() if isinstance(item, WholeChunk)]
     data = bytes(chunks[0].data)
 
     def table(part: bytes):
