@@ -14,16 +14,15 @@ time of day would have the rack scan for 50 years). Both are reported. A time of
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.runtime.time.pacer import CHORE_PERIOD_NS, LONGEST_WAIT_NS, WALL_CLOCK, WALL_WAIT, Turn, Wait, by_steps
+from automax_ros.runtime.time.pacer import LONGEST_WAIT_NS, WALL_WAIT, SteppedPacer, Turn, Wait
 from automax_ros.runtime.time.scheduler import Scheduler
 
 LONGEST_JUMP_NS = 10 * NS_PER_S
 
 
-class FollowingPacer:
+class FollowingPacer(SteppedPacer):
     """Makes a scheduler's time follow a clock; its receiver calls ``heard`` while it holds ``turn``."""
 
     def __init__(
@@ -34,45 +33,29 @@ class FollowingPacer:
         wait: Wait = WALL_WAIT,
         turn: Turn | None = None,
     ) -> None:
-        """Create it for a scheduler.
-
-        Args:
-            scheduler: its events are executed.
-            jumped: called with the size (ns) of a jump of the clock that the rack does not follow; negative is back.
-            wait: spends at most a time in s.
-            turn: held while ``run`` calls ``on_idle``.
-        """
-        self._scheduler, self._jumped, self._wait = scheduler, jumped, wait
-        self._turn: Turn = nullcontext() if turn is None else turn
-        self._heard_ns: int | None = None
+        """Create it; ``jumped`` is called with a jump of the clock (ns, negative is back) that is not followed."""
+        super().__init__(scheduler, wait=wait, turn=turn)
+        self._jumped = jumped
+        self._received_ns: int | None = None
         self._zero_ns: int | None = None
-        self._until_ns: int | None = None
         self._opens = False
 
     @property
     def has_clock(self) -> bool:
         """Whether a time was received, so that the rack can start."""
-        return self._heard_ns is not None
-
-    @property
-    def now_ns(self) -> int:
-        """The scheduler's time: that of the clock, minus its first time."""
-        return self._scheduler.now_ns
+        return self._received_ns is not None
 
     def begin(self, start_delay_ns: int = 0) -> int:  # noqa: ARG002
         """Map the scheduler's present to the last time received, which is returned."""
-        heard = self._heard_ns or 0
-        self._zero_ns, self._opens = heard - self._scheduler.now_ns, True
-        return heard
-
-    def catch_up(self) -> None:
-        """Do nothing: the present is the last time received."""
+        received = self._received_ns or 0
+        self._zero_ns, self._opens = received - self._scheduler.now_ns, True
+        return received
 
     def heard(self, clock_ns: int) -> None:
         """Follow the clock to a time, and execute all events up to it if the rack has started."""
         if clock_ns <= 0:
             return
-        self._heard_ns = clock_ns
+        self._received_ns = clock_ns
         if self._zero_ns is None or self._is_over():
             return
         ahead = self.ahead_ns(clock_ns)
@@ -80,41 +63,15 @@ class FollowingPacer:
             self._zero_ns += ahead
             self._jumped(ahead)
         else:
-            self._pass(self._scheduler.now_ns + ahead)
+            self._advance(self._scheduler.now_ns + ahead)
 
     def ahead_ns(self, clock_ns: int) -> int:
         """Return how far a time of the clock is ahead of the last one, ns; 0 before the rack has started."""
         return 0 if self._zero_ns is None else clock_ns - self._zero_ns - self._scheduler.now_ns
 
-    def _pass(self, target_ns: int) -> None:
-        if self._until_ns is not None and target_ns >= self._until_ns:
-            self._scheduler.run_until(self._until_ns)
-        else:
-            self._scheduler.run_through(target_ns)
-
     def step(self) -> float:
         """Execute the events at the instant of ``begin``; later ones are executed by ``heard``."""
         if self._opens:
             self._opens = False
-            self._pass(self._scheduler.now_ns)
+            self._advance(self._scheduler.now_ns)
         return LONGEST_WAIT_NS / NS_PER_S
-
-    def run(
-        self,
-        until_ns: int | None = None,
-        on_idle: Callable[[int], None] | None = None,
-        should_stop: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """Wait while ``heard`` advances time, until it is ``until_ns``, or until asked to stop (``Pace.run``)."""
-        self._until_ns = until_ns
-        by_steps(
-            self,
-            lambda: self._is_over() or should_stop(),
-            WALL_CLOCK,
-            self._wait,
-            self._turn,
-            (on_idle, CHORE_PERIOD_NS),
-        )
-
-    def _is_over(self) -> bool:
-        return self._until_ns is not None and self._scheduler.now_ns >= self._until_ns

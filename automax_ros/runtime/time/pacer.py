@@ -30,12 +30,8 @@ Wait = Callable[[float], object]
 """Spends at most a time in s, 0 or more; it may return early."""
 Turn = AbstractContextManager[object]
 """A lock that keeps other threads from the rack while it is held."""
-
-
 BREATH_S, BREATH_PERIOD_NS = 0.0001, 2 * NS_PER_MS
 """How long (s), and how often (ns of the wall clock), a pacer that never waits gives other threads time."""
-
-
 LONGEST_WAIT_NS = 50 * NS_PER_MS
 """The loop wakes at least this often, so that it responds to signals at once."""
 START_LEAD_NS = 50 * NS_PER_MS
@@ -45,8 +41,7 @@ CHORE_PERIOD_NS = 100 * NS_PER_MS
 CHORE_ROOM_NS = 2 * NS_PER_MS
 """``on_idle`` is delayed, by another period at most, while the next event is nearer than this."""
 WALL_CLOCK: Callable[[], int] = time.monotonic_ns
-WALL_WAIT: Callable[[float], object] = time.sleep
-"""The wall clock, for pacers that keep another time but must respond to the user meanwhile."""
+WALL_WAIT: Wait = time.sleep
 
 
 class Pace(Protocol):
@@ -77,28 +72,61 @@ class Pace(Protocol):
         """
 
 
-def by_steps(
-    pace: Pace,
-    is_over: Callable[[], bool],
-    wall: Callable[[], int],
-    wait: Wait,
-    turn: Turn,
-    chore: tuple[Callable[[int], None] | None, int],
-) -> None:
-    """Step a pacer until ``is_over``; ``chore`` is a function that gets the time, and its period (ns, wall clock)."""
-    act, period_ns = chore
-    next_chore = next_breath = wall()
-    while not is_over():
-        with turn:
-            pause_s = pace.step()
-        now = wall()
-        if act is not None and now >= next_chore:
-            next_chore = now + period_ns
-            with turn:
-                act(pace.now_ns)
-        if pause_s > 0 or now >= next_breath:
-            wait(max(pause_s, BREATH_S))
-            next_breath = wall() + BREATH_PERIOD_NS
+class SteppedPacer(Pace):
+    """A pacer of time that is not the wall clock's: its present is the last instant that was executed."""
+
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        *,
+        clock: Callable[[], int] = WALL_CLOCK,
+        wait: Wait = WALL_WAIT,
+        turn: Turn | None = None,
+    ) -> None:
+        """Create it as ``Pacer``; ``clock`` only times what is done between events."""
+        self._scheduler, self._clock, self._wait = scheduler, clock, wait
+        self._turn: Turn = nullcontext() if turn is None else turn
+        self._until_ns: int | None = None
+
+    @property
+    def now_ns(self) -> int:
+        """The scheduler's time."""
+        return self._scheduler.now_ns
+
+    def catch_up(self) -> None:
+        """Do nothing: the present is the last instant that was executed."""
+
+    def run(
+        self,
+        until_ns: int | None = None,
+        on_idle: Callable[[int], None] | None = None,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Advance time until it is ``until_ns``, or until asked to stop (``Pace.run``)."""
+        self._until_ns = until_ns
+        next_chore = next_breath = self._clock()
+        while not (self._is_over() or should_stop()):
+            with self._turn:
+                pause_s = self.step()
+            now = self._clock()
+            if on_idle is not None and now >= next_chore:
+                next_chore = now + CHORE_PERIOD_NS
+                with self._turn:
+                    on_idle(self.now_ns)
+            if pause_s > 0 or now >= next_breath:
+                self._wait(max(pause_s, BREATH_S))
+                next_breath = self._clock() + BREATH_PERIOD_NS
+
+    def _advance(self, target_ns: int) -> bool:
+        """Execute all events up to and at an instant, at most those before the end of ``run``: return FALSE then."""
+        if self._until_ns is not None and target_ns >= self._until_ns:
+            self._scheduler.run_until(self._until_ns)
+            return False
+        self._scheduler.run_through(target_ns)
+        return True
+
+    def _is_over(self) -> bool:
+        return self._until_ns is not None and self._scheduler.now_ns >= self._until_ns
 
 
 class Pacer:
@@ -108,24 +136,19 @@ class Pacer:
         self,
         scheduler: Scheduler,
         *,
-        clock: Callable[[], int] = time.monotonic_ns,
-        wait: Callable[[float], object] = time.sleep,
-        turn: AbstractContextManager[object] | None = None,
+        clock: Callable[[], int] = WALL_CLOCK,
+        wait: Wait = WALL_WAIT,
+        turn: Turn | None = None,
     ) -> None:
-        """Create it for a scheduler, whose time passes from ``begin`` on.
+        """Create it for a scheduler, whose time passes from ``begin`` on by ``clock`` (ns, monotonic).
 
-        Args:
-            scheduler: its events are executed.
-            clock: the wall clock in ns, monotonic.
-            wait: spends at most a time in s, 0 or more; it may return early, as when a message has arrived.
-            turn: held, again and again, while ``run`` executes events or calls ``on_idle``, to keep other threads from
-                the rack.
+        ``turn`` is held, again and again, while ``run`` executes events or calls ``on_idle``.
         """
         self._scheduler, self._clock, self._wait = scheduler, clock, wait
-        self._turn: AbstractContextManager[object] = nullcontext() if turn is None else turn
+        self._turn: Turn = nullcontext() if turn is None else turn
         self._zero_ns: int | None = None
         self.halted = False
-        self.while_halted: Callable[[], object] = _nothing
+        self.while_halted: Callable[[], object] = lambda: None
 
     def begin(self, start_delay_ns: int = 0) -> int:
         """Map the scheduler's present to ``start_delay_ns`` from now on the wall clock; return that time of day, ns."""
@@ -203,7 +226,6 @@ class Pacer:
             self._scheduler.run_due(now_ns)
 
     def _is_chore_time(self, since_ns: int) -> bool:
-        """Return whether a chore, due since a time of the wall clock, may be done: it has time, or has waited long."""
         waited = self._clock() - since_ns
         if waited < 0 or self.halted or waited >= CHORE_PERIOD_NS:
             return waited >= 0
@@ -216,7 +238,3 @@ class Pacer:
         now = self.now_ns
         ends = (now + LONGEST_WAIT_NS, self._scheduler.next_ns, until_ns)
         return max(0, min(end for end in ends if end is not None) - now) / NS_PER_S
-
-
-def _nothing() -> None:
-    """Do nothing while time is stopped."""

@@ -117,10 +117,10 @@ class Scheduler:
             heapq.heappop(self._queue)
         return self._queue[0][0] if self._queue else None
 
-    def due_ns(self, event: ScheduledEvent) -> int | None:
+    def due_ns(self, event: ScheduledEvent | None) -> int | None:
         """Return the next instant of an event, None if it has none any more."""
         found = (entry[0] for entry in self._queue if entry[5] is event)
-        return None if event.cancelled else next(found, None)
+        return None if event is None or event.cancelled else next(found, None)
 
     def advance_to(self, time_ns: int, key: EventKey) -> bool:
         """Advance to ``time_ns`` if no event precedes one of that instant and key, and the present run reaches it.

@@ -6,11 +6,10 @@ It runs as fast as the machine can, or at ``rate`` times the wall clock. Actions
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.runtime.time.pacer import CHORE_PERIOD_NS, LONGEST_WAIT_NS, WALL_CLOCK, WALL_WAIT, Turn, Wait, by_steps
+from automax_ros.runtime.time.pacer import LONGEST_WAIT_NS, WALL_CLOCK, WALL_WAIT, SteppedPacer, Turn, Wait
 from automax_ros.runtime.time.scheduler import Scheduler
 
 LEAST_TICK_NS = 1 * NS_PER_MS
@@ -28,7 +27,7 @@ class SimulatedTime:
     rate: float | None = None
 
 
-class SimulatedPacer:
+class SimulatedPacer(SteppedPacer):
     """Advances a scheduler's time without a clock, and publishes it."""
 
     def __init__(
@@ -41,37 +40,21 @@ class SimulatedPacer:
         wait: Wait = WALL_WAIT,
         turn: Turn | None = None,
     ) -> None:
-        """Create it for a scheduler.
+        """Create it; ``tell`` is called with the time once all events up to and at it are executed.
 
-        Args:
-            scheduler: its events are executed.
-            tell: called with the time once all events up to and at it are executed.
-            rate: how many times faster than the wall clock, above 0; None is as fast as possible.
-            clock: the wall clock in ns, monotonic; only for ``rate`` and ``on_idle``.
-            wait: spends at most a time in s.
-            turn: held while the scheduler's time passes.
+        Time passes at ``rate`` times that of ``clock`` (the wall clock, ns), as fast as possible if None.
         """
-        self._scheduler, self._tell, self._rate = scheduler, tell, rate
-        self._clock, self._wait = clock, wait
-        self._turn: Turn = nullcontext() if turn is None else turn
+        super().__init__(scheduler, clock=clock, wait=wait, turn=turn)
+        self._publish, self._rate = tell, rate
         self._zero_ns: int | None = None
-        self._told_ns: int | None = None
-        self._until_ns: int | None = None
+        self._published_ns: int | None = None
         self.halted = False
         self.while_halted: Callable[[], object] = lambda: None
-
-    @property
-    def now_ns(self) -> int:
-        """The scheduler's time: there is no other."""
-        return self._scheduler.now_ns
 
     def begin(self, start_delay_ns: int = 0) -> int:  # noqa: ARG002
         """Advance time from now on; stamps are rack time, so that of the present is 0 at the start."""
         self._zero_ns = None
         return self._scheduler.now_ns
-
-    def catch_up(self) -> None:
-        """Do nothing: the present is the last instant that was executed."""
 
     def halt(self) -> None:
         """Stop time; ``while_halted`` is called at intervals, and the clock shows the time of steps."""
@@ -85,47 +68,24 @@ class SimulatedPacer:
         """Execute the next instant if it is due; return the time (s) to the next."""
         if self.halted:
             self.while_halted()
-            self._tell_at(self._scheduler.now_ns)
+            self._publish_now()
             return LONGEST_WAIT_NS / NS_PER_S
         pause_ns = self._pause_ns()
         if pause_ns > 0:
             return min(pause_ns, LONGEST_WAIT_NS) / NS_PER_S
-        target = self._target_ns()
-        if self._until_ns is not None and target >= self._until_ns:
-            self._scheduler.run_until(self._until_ns)
-        else:
-            self._scheduler.run_through(target)
-            self._tell_at(self._scheduler.now_ns)
+        if self._advance(self._target_ns()):
+            self._publish_now()
         return max(0, min(self._pause_ns(), LONGEST_WAIT_NS)) / NS_PER_S
 
-    def run(
-        self,
-        until_ns: int | None = None,
-        on_idle: Callable[[int], None] | None = None,
-        should_stop: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """Advance time until it is ``until_ns``, or until asked to stop (``Pace.run``)."""
-        self._until_ns = until_ns
-        by_steps(
-            self,
-            lambda: self._is_over() or should_stop(),
-            self._clock,
-            self._wait,
-            self._turn,
-            (on_idle, CHORE_PERIOD_NS),
-        )
-
-    def _tell_at(self, now_ns: int) -> None:
-        if self._told_ns is None or now_ns - self._told_ns >= LEAST_TICK_NS:
-            self._told_ns = now_ns
-            self._tell(now_ns)
-
-    def _is_over(self) -> bool:
-        return self._until_ns is not None and self._scheduler.now_ns >= self._until_ns
+    def _publish_now(self) -> None:
+        now_ns = self._scheduler.now_ns
+        if self._published_ns is None or now_ns - self._published_ns >= LEAST_TICK_NS:
+            self._published_ns = now_ns
+            self._publish(now_ns)
 
     def _target_ns(self) -> int:
         """Return the next instant at which an event is due, or the clock must be published."""
-        tick = self._scheduler.now_ns if self._told_ns is None else self._told_ns + MOST_TICK_NS
+        tick = self._scheduler.now_ns if self._published_ns is None else self._published_ns + MOST_TICK_NS
         due = self._scheduler.next_ns
         return max(self._scheduler.now_ns, tick if due is None else min(tick, due))
 
