@@ -25,8 +25,8 @@ from automax_ros.rackfile.model.writers import OPERATOR_WRITER
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.process_inputs import ProcessInputs
 from automax_ros.runtime.memory.views import MemoryValueError
+from automax_ros.runtime.tasks.keep_values import stepped
 from automax_ros.runtime.tasks.task import Task
-from automax_ros.runtime.tasks.tuning_steps import stepped
 
 Tune = Callable[[Task, str, object], None]
 _NOT_REPORTED = ""

@@ -20,7 +20,7 @@ from automax_ros.replay.scans.stored_rack import ReplaySource, unknown_value
 from automax_ros.replay.scans.totals import MOST_NOTES, TaskTotals
 from automax_ros.replay.scans.tunables import Tunables
 from automax_ros.runtime.scan.error_log import snapshot_layout
-from automax_ros.runtime.tasks.make_task import make_task
+from automax_ros.runtime.tasks.make_task import task_class
 from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, Status, Task
 
 _MOST_NAMES = 8
@@ -75,7 +75,7 @@ class TaskReplay:
         self._comparison = ScanComparison(source, commons, self.memory, tallies, tolerance)
         self._tolerance = tolerance
         self._starts_at = starts_at
-        self._task = make_task(
+        self._task = task_class(source.compiled.program)(
             source.compiled,
             self.memory,
             backplane=commons.backplane,

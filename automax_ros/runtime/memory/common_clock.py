@@ -8,29 +8,18 @@ and that of the other modules are the same (decision: the manuals say so of neit
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from automax_ros.core.ticks import CLOCK_PERIOD_NS
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 ENABLE_BIT = 6
-"""The bit that drives the clock, in a UDC's register 2000 as in the ISCR of I/O modules (decision).
-
-The 57C411's manual says so of that module (p. 4-1).
-"""
+"""The bit that drives the clock, in a UDC's register 2000 as in the ISCR of I/O modules (decision; 57C411 p. 4-1)."""
 SECOND_DRIVER = "38"
 """The hardware's code where two modules drive the clock (S-3056 p. 4-4)."""
 
 Fault = Callable[[str, str], None]
 """Stops all tasks, given the reason and the hardware's code."""
-
-
-@dataclass(frozen=True)
-class _Enable:
-    module: str
-    view: int
-    register: int
 
 
 class CommonClock:
@@ -39,9 +28,9 @@ class CommonClock:
     def __init__(self, scheduler: Scheduler, memory: CommonMemory, fault: Fault) -> None:
         """Create a clock that no module drives."""
         self._scheduler, self._memory, self._fault = scheduler, memory, fault
-        self._enables: list[_Enable] = []
+        self._enables: list[tuple[str, int, int]] = []
         self._watchers: list[Callable[[], None]] = []
-        self._looks = False
+        self._posted = False
         self.since_ns: int | None = None
 
     @property
@@ -51,11 +40,7 @@ class CommonClock:
 
     @property
     def next_ns(self) -> int:
-        """The end of the present interval: the first one begins when the clock is turned on.
-
-        Raises:
-            ValueError: the clock does not run.
-        """
+        """End of the present interval; the first begins when the clock is turned on. ValueError if it does not run."""
         if self.since_ns is None:
             raise ValueError("the common clock does not run")
         passed = (self._scheduler.now_ns - self.since_ns) // CLOCK_PERIOD_NS
@@ -63,8 +48,8 @@ class CommonClock:
 
     def add_enable(self, module: str, view: int, register: int) -> None:
         """Register a module that drives the clock by ``ENABLE_BIT`` of a register of its bank ``view``."""
-        self._enables.append(_Enable(module, view, register))
-        self._memory.watch(view, register, self._look_soon)
+        self._enables.append((module, view, register))
+        self._memory.watch(view, register, self._check_soon)
 
     def watch(self, changed: Callable[[], None]) -> None:
         """Call ``changed`` when the clock has started or stopped."""
@@ -74,25 +59,21 @@ class CommonClock:
         """Restore the time since which the clock runs, to match restored memory; no watcher is called."""
         self.since_ns = since_ns
         if bool(self._drivers()) is not self.runs:
-            self._look_soon()
+            self._check_soon()
 
     def _drivers(self) -> list[str]:
-        """Return the modules that drive it, each once."""
-        set_bits = (
-            item.module
-            for item in self._enables
-            if int(self._memory.read_now(item.view, item.register)) >> ENABLE_BIT & 1
-        )
+        read = self._memory.read_now
+        set_bits = (name for name, view, register in self._enables if int(read(view, register)) >> ENABLE_BIT & 1)
         return list(dict.fromkeys(set_bits))
 
-    def _look_soon(self) -> None:
+    def _check_soon(self) -> None:
         """Check the bits once the write that may have changed one is complete, still at this instant."""
-        if not self._looks:
-            self._looks = True
-            self._scheduler.at(self._scheduler.now_ns, EventKey(EventClass.IO, 0, ""), self._look)
+        if not self._posted:
+            self._posted = True
+            self._scheduler.at(self._scheduler.now_ns, EventKey(EventClass.IO, 0, ""), self._check)
 
-    def _look(self, now_ns: int) -> None:
-        self._looks = False
+    def _check(self, now_ns: int) -> None:
+        self._posted = False
         drivers = self._drivers()
         if len(drivers) > 1:
             self._fault(f"{drivers[0]} and {drivers[1]} both drive the common clock (AMX7072)", SECOND_DRIVER)

@@ -1,15 +1,13 @@
 """The private image of a module that works on copies of common memory, such as a UDC (S-3006 p. 4-2).
 
-Its tasks latch, commit, read and write in the image; the module copies chosen views in and out at its own instants.
-
-``LocalMemory`` is the memory of a UDC's tasks: the module's local memory for its application registers, which the UDC
-copies from and to the dual port at its own instants (S-3056 p. 3-50). Tasks access all other registers in the dual
-port: blocks through the latch, BASIC statements at once (S-3006 p. 4-9).
+``LocalMemory`` is the memory of a UDC's tasks: the image for its application registers, which the UDC copies from and
+to the dual port at its own instants (S-3056 p. 3-50). Tasks access all other registers in the dual port: blocks through
+the latch, BASIC statements at once (S-3006 p. 4-9).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
@@ -45,26 +43,6 @@ class PrivateImage(Image):
         value = self.registers.keeping(view, element, value, self._common.forced, self.read_now)
         self._spread(view, element, value)
 
-    def is_forced(self, view: int) -> bool:
-        """Return whether a force holds a simple view."""
-        return self._common.is_forced(view)
-
-    def under_force(self, view: int) -> Value:
-        """Return the value of a simple view: tasks that need the value under a force do not use an image (decision)."""
-        return self.read_now(view)
-
-    def watch_forces(self, changed: Callable[[], None]) -> None:
-        """Call ``changed`` whenever a force begins or ends."""
-        self._common.watch_forces(changed)
-
-    def copy_in(self, views: Iterable[int]) -> None:
-        """Copy views from common memory."""
-        self.take(self._elements(views))
-
-    def copy_out(self, views: Iterable[int], writer: int) -> None:
-        """Write views that differ to common memory, as commits of ``writer``."""
-        self.give(self._elements(views), writer)
-
     def take(self, keys: Iterable[tuple[int, int]]) -> None:
         """Copy single values from common memory; ``keys`` are views with elements."""
         for view, element in keys:
@@ -87,11 +65,7 @@ class PrivateImage(Image):
         for view, element in keys:
             self._put(view, element, self.specs[view].type.zero)
 
-    def _elements(self, views: Iterable[int]) -> list[tuple[int, int]]:
-        return [(view, element) for view in views for element in range(self.specs[view].elements)]
-
     def _spread(self, view: int, element: int, value: Value) -> None:
-        """Store a value, and update other views of the same registers."""
         entries = list(self.registers.consequences(view, element, value, self.read_now)) if view in self._shared else []
         for entry in ((view, element, value), *entries):
             self._put(*entry)
@@ -104,6 +78,8 @@ class LocalMemory:
         """Create the local memory as at installation."""
         self.image = PrivateImage(common.specs, common)
         self._common, self._local = common, frozenset(local)
+        self.view, self.is_forced, self.under_force = common.view, common.is_forced, common.under_force
+        self.watch_forces, self.latch = common.watch_forces, self.image.latch
 
     @property
     def now_ns(self) -> int:
@@ -113,10 +89,6 @@ class LocalMemory:
     @now_ns.setter
     def now_ns(self, now_ns: int) -> None:
         self._common.now_ns = now_ns
-
-    def view(self, name: str) -> int:
-        """Return the view of a variable by its full name; KeyError if there is none."""
-        return self._common.view(name)
 
     def plan(self, views: Sequence[int]) -> LatchPlan:
         """Return the prepared list of simple views that a task latches."""
@@ -130,10 +102,6 @@ class LocalMemory:
             return pick(cells)
 
         return latched
-
-    def latch(self, plan: LatchPlan) -> Latched:
-        """Return copies of the planned views, in their order (3.3)."""
-        return self.image.latch(plan)
 
     def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
         """Write the values that a scan's blocks changed, at END."""
@@ -150,15 +118,3 @@ class LocalMemory:
     ) -> None:
         """Write an actual value, already within the view's type."""
         (self.image if view in self._local else self._common).write_now(view, value, writer, element, kind)
-
-    def is_forced(self, view: int) -> bool:
-        """Return whether a force holds a simple view."""
-        return self._common.is_forced(view)
-
-    def under_force(self, view: int) -> Value:
-        """Return the value of a simple view without its force."""
-        return self._common.under_force(view)
-
-    def watch_forces(self, changed: Callable[[], None]) -> None:
-        """Call ``changed`` whenever a force begins or ends."""
-        self._common.watch_forces(changed)

@@ -33,23 +33,15 @@ def item_types(types: str) -> tuple[DataType, ...]:
 
 
 class ChannelAccess(Protocol):
-    """Access of tasks to channels; the channels of a rack and those of a recording implement it."""
+    """The channels of a rack (``Channels``) or of a recording, as tasks use them."""
 
-    def open_reader(self, number: int, types: str, depth: int, reader: str, now_ns: int) -> int:
-        """Make a task the reader; return the problem or 0."""
-        ...
+    def open_reader(self, number: int, types: str, depth: int, reader: str, now_ns: int) -> int: ...  # noqa: D102
 
-    def open_writer(self, number: int, types: str) -> int:
-        """Return 0, MUST_WAIT while no task reads the channel, or the problem."""
-        ...
+    def open_writer(self, number: int, types: str) -> int: ...  # noqa: D102
 
-    def receive(self, number: int, types: str, reader: str, now_ns: int) -> tuple[Message, int]:
-        """Return the oldest message and 0, or nothing and MUST_WAIT or the problem."""
-        ...
+    def receive(self, number: int, types: str, reader: str, now_ns: int) -> tuple[Message, int]: ...  # noqa: D102
 
-    def send(self, number: int, types: str, message: Message, now_ns: int) -> int:
-        """Add a message; return 0, MUST_WAIT if the channel is full, or the problem."""
-        ...
+    def send(self, number: int, types: str, message: Message, now_ns: int) -> int: ...  # noqa: D102
 
 
 @dataclass

@@ -6,7 +6,7 @@ has its usual value is left out (decision: a drive at rest then takes some five 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.drive.current_loop.signals import Command, Measured, Pulse
@@ -49,24 +49,19 @@ def noted_time(now_ns: int) -> list[Noted]:
 
 def noted_command(command: Command) -> list[Noted]:
     """Return the numbers to note of a command; the first is always noted."""
+    numbers = [command.next_ns, command.relays, command.level, int(command.block), int(command.ok)]
+    for pulse in command.pulses[:MOST_PULSES]:
+        numbers += pulse
     noted: list[Noted] = []
-    for place, value in enumerate(command_numbers(command)):
+    for place, value in enumerate(numbers):
         if not place or value != (_USUAL_COMMAND[place] if place < _FIRST_PULSE else 0):
             noted.append((COMMAND_VIEW, place, value))
     return noted
 
 
-def command_numbers(command: Command) -> list[int]:
-    """Return a command as whole numbers."""
-    numbers = [command.next_ns, command.relays, command.level, int(command.block), int(command.ok)]
-    for pulse in command.pulses[:MOST_PULSES]:
-        numbers += pulse
-    return numbers
-
-
 def measured_of(noted: Iterable[Noted]) -> Measured | None:
     """Return the noted measurement; None if there is none."""
-    numbers = dict(_of_view(MEASURED_VIEW, noted))
+    numbers = _of_view(MEASURED_VIEW, noted)
     if 0 not in numbers:
         return None
     return Measured(*(numbers.get(place, usual) for place, usual in enumerate(_USUAL)))
@@ -74,26 +69,23 @@ def measured_of(noted: Iterable[Noted]) -> Measured | None:
 
 def time_of(noted: Iterable[Noted]) -> int | None:
     """Return the noted rack time in ns; None if there is none."""
-    numbers = dict(_of_view(MEASURED_VIEW, noted))
+    numbers = _of_view(MEASURED_VIEW, noted)
     return numbers[_SECONDS] * NS_PER_S + numbers.get(_REST, 0) if _SECONDS in numbers else None
 
 
 def command_of(noted: Iterable[Noted]) -> Command | None:
     """Return the noted command; None if there is none."""
-    numbers = dict(_of_view(COMMAND_VIEW, noted))
+    numbers = _of_view(COMMAND_VIEW, noted)
     if not numbers:
         return None
     fields = {
         name: type(Command._field_defaults.get(name, 0))(numbers.get(place, _USUAL_COMMAND[place]))
         for place, name in enumerate(COMMAND_NAMES)
     }
-    first = _FIRST_PULSE
-    count = (max(numbers) - first) // _PULSE + 1 if max(numbers) >= first else 0
-    pulses = (first + _PULSE * number for number in range(count))
-    return Command(
-        **fields, pulses=tuple(Pulse(*(numbers.get(place + item, 0) for item in range(_PULSE))) for place in pulses)
-    )
+    starts = range(_FIRST_PULSE, max(numbers) + 1, _PULSE)
+    pulses = tuple(Pulse(*(numbers.get(start + item, 0) for item in range(_PULSE))) for start in starts)
+    return Command(**fields, pulses=pulses)
 
 
-def _of_view(view: int, noted: Iterable[Noted]) -> Iterator[tuple[int, int]]:
-    return ((element, value) for entry_view, element, value in noted if entry_view == view)
+def _of_view(view: int, noted: Iterable[Noted]) -> dict[int, int]:
+    return {element: value for entry_view, element, value in noted if entry_view == view}

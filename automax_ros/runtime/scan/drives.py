@@ -18,28 +18,21 @@ NO_LINE = Measured(0)
 class DrivePort(Protocol):
     """One 57C406 with the drive that it controls.
 
-    A task arms it, is called at each interrupt, and then gets the measurement and gives the command for the time to the
+    A task arms it, is called at each interrupt, then reads the measurement and gives the command for the time to the
     next. Without a command the interrupts continue at their present interval.
     """
 
     def initialise(self) -> None:
         """Give the registers 4136, 4137, 4138 and 4146 their defaults: the task is put into RUN (52.4 to 52.7)."""
-        ...
 
     def watch_speed(self, counts: int) -> None:
         """Set up the hardware's overspeed circuit with a threshold, 4095 at full speed; 0 for none (52.1.5)."""
-        ...
 
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
-        """Interrupt at ``first_ns`` and from then on.
-
-        At each interrupt ``due`` is called with its instant, ordered by ``key`` among the scans of that instant.
-        """
-        ...
+        """Interrupt from ``first_ns`` on: ``due`` is called at each instant, with the order ``key`` among its scans."""
 
     def disarm(self) -> None:
         """Stop interrupting: gates and contactor relays are off at once. A second call does nothing."""
-        ...
 
     @property
     def next_ns(self) -> int | None:
@@ -47,15 +40,11 @@ class DrivePort(Protocol):
         ...
 
     def measure(self, dig_slot: int) -> Measured:
-        """Return the measurement of the last interrupt, with the present registers and inputs.
-
-        Inputs and relays are those of the drive digital I/O module in ``dig_slot``.
-        """
+        """Return the last interrupt's measurement, with present registers; ``dig_slot`` has the digital I/O module."""
         ...
 
     def command(self, command: Command) -> None:
         """Execute a command up to the next interrupt; its times count from the last one."""
-        ...
 
 
 class DriveAccess(Protocol):

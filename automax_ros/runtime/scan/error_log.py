@@ -1,7 +1,4 @@
-"""A task's error log: the first, the second and the last entry (J2-3106-1 p. 13-4).
-
-``snapshot_layout`` is the layout of a task's snapshot: its state, a drive's loop if it has one, and its error log.
-"""
+"""A task's error log: the first, the second and the last entry (J2-3106-1 p. 13-4)."""
 
 from __future__ import annotations
 
@@ -67,8 +64,7 @@ class ErrorLog:
 
     def clear(self) -> None:
         """Empty the log (CLR_ERRLOG, or the operator)."""
-        self.first = self.second = self.last = None
-        self.count = 0
+        self.first, self.second, self.last, self.count = None, None, None, 0
 
     @property
     def entries(self) -> list[LogEntry]:
@@ -90,11 +86,7 @@ class ErrorLog:
         return numbers
 
     def restore(self, numbers: list[int]) -> None:
-        """Restore the log from ``flatten``'s numbers.
-
-        Raises:
-            ValueError: not ten numbers.
-        """
+        """Restore the log from ``flatten``'s numbers; ValueError if they are not ten."""
         if len(numbers) != LOG_NUMBERS:
             raise ValueError(f"an error log is {LOG_NUMBERS} numbers, not {len(numbers)}")
         self.count = numbers[0]
@@ -106,9 +98,7 @@ class ErrorLog:
 def snapshot_layout(compiled: CompiledTask) -> Layout:
     """Return the layout of a task's snapshots: the state, the numbers of its minor loop, the error log."""
     cml = compiled.program.cml
-    loop = () if cml is None else (_loop_field(cml.block.name),)
-    return Layout((*compiled.layout.fields, *loop, _LOG))
-
-
-def _loop_field(name: str) -> StateField:
-    return StateField(name, DataType.REAL, Role.BLOCK, 0.0, NUMBERS, is_array=True)
+    if cml is None:
+        return Layout((*compiled.layout.fields, _LOG))
+    loop = StateField(cml.block.name, DataType.REAL, Role.BLOCK, 0.0, NUMBERS, is_array=True)
+    return Layout((*compiled.layout.fields, loop, _LOG))

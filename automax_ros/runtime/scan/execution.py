@@ -1,4 +1,4 @@
-"""The time that scans take: ideal ones take none; ``processor_time`` has those that take the manual's time."""
+"""The time that scans take: ideal ones take none; ``ModeledExecution`` has those that take the manual's time."""
 
 from __future__ import annotations
 
@@ -14,21 +14,19 @@ Place = Mapping[str, Any]
 
 
 class Job(Protocol):
-    """A unit of work for a Processor: a scan of a task, or what a BASIC task does from one suspension to the next."""
+    """A unit of work for a Processor: a scan of a task, or what a BASIC task does from one suspension to the next.
+
+    ``priority`` is 4 (first) to 11; ``name``, the task's, is the order among equals.
+    """
 
     @property
-    def name(self) -> str:
-        """The task's name: the order among equal priorities."""
-        ...
+    def name(self) -> str: ...  # noqa: D102
 
     @property
-    def priority(self) -> int:
-        """4 (first) to 11."""
-        ...
+    def priority(self) -> int: ...  # noqa: D102
 
     def whole(self, now_ns: int, skipped: int) -> None:
         """Execute it at one instant and report it; ``skipped`` deadlines were missed before."""
-        ...
 
     def steps(self, now_ns: int, skipped: int) -> Steps:
         """Execute it in steps, beginning at an instant."""
@@ -36,58 +34,40 @@ class Job(Protocol):
 
     def done(self, record: ScanRecord | None) -> None:
         """Note that all steps were executed."""
-        ...
 
 
 class Execution(Protocol):
-    """Executes jobs: at once, or as a Processor has time."""
+    """Executes jobs: at once, as the methods of this class do, or as a Processor has time."""
 
     def begin(self, job: Job, now_ns: int, skipped: int) -> None:
         """Begin to execute a job, which must not be in progress."""
-        ...
-
-    def busy(self, job: Job) -> bool:
-        """Return whether a job that was begun is not done yet."""
-        ...
-
-    def drop(self, job: Job) -> None:
-        """Abandon a job, at whatever step; nothing is executed by this."""
-        ...
-
-    def place(self, job: Job) -> Place | None:
-        """Return the progress of a job; None if it is not in progress."""
-        ...
-
-    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
-        """Continue a job from its place; ``steps`` are at this place, None if it had not begun."""
-        ...
-
-
-class IdealExecution:
-    """A scan takes no time."""
-
-    def begin(self, job: Job, now_ns: int, skipped: int) -> None:
-        """Execute the job at once."""
         job.whole(now_ns, skipped)
 
     def busy(self, job: Job) -> bool:  # noqa: ARG002
-        """Return False: jobs are done when they are begun."""
+        """Return whether a job that was begun is not done yet."""
         return False
 
     def drop(self, job: Job) -> None:
-        """Do nothing: no job is in progress."""
+        """Abandon a job, at whatever step; nothing is executed by this."""
 
     def place(self, job: Job) -> Place | None:  # noqa: ARG002
-        """Return None: no job is in progress."""
+        """Return the progress of a job; None if it is not in progress."""
         return None
 
     def resume(self, job: Job, place: Place, steps: Steps | None) -> None:  # noqa: ARG002
-        """Refuse: no job takes time.
+        """Continue a job from its place; ``steps`` are at this place, None if it had not begun.
 
         Raises:
-            ValueError: always.
+            ValueError: jobs take no time.
         """
         raise ValueError(f"task {job.name} was in the middle of a scan: the state is that of modeled execution")
+
+
+class IdealExecution(Execution):
+    """A scan takes no time."""
+
+    def drop(self, job: Job) -> None:
+        """Do nothing: no job is in progress."""
 
 
 IDEAL = IdealExecution()

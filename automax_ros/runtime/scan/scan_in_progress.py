@@ -16,7 +16,7 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.views import LatchPlan
-from automax_ros.runtime.scan.error_log import ErrorLog, LogEntry
+from automax_ros.runtime.scan.error_log import ErrorLog
 from automax_ros.runtime.scan.scan_record import ScanRecord
 from automax_ros.runtime.scan.task_io import Call, ScanMemory
 
@@ -25,10 +25,10 @@ Progress = Mapping[str, Any]
 
 
 class ReplayableReads:
-    """Memory as a scan in progress uses it: ``heard`` are all values that it has read since it began.
+    """Memory as a scan in progress uses it: ``noted`` are all values that it has read since it began.
 
-    After ``tell`` it returns the values that an earlier scan read and writes nothing, until ``live``. ``latched`` are
-    the views of a latch.
+    After ``replay`` it returns the values that an earlier scan read and writes nothing, until ``end_replay``.
+    ``latched`` are the views of a latch.
     """
 
     def __init__(self, memory: ScanMemory) -> None:
@@ -36,82 +36,81 @@ class ReplayableReads:
         self._memory = memory
         self._accesses: Mapping[int, Call] = memory.accesses if isinstance(memory, CommonMemory) else {}
         self.latched: Sequence[int] = ()
-        self._told: Iterator[Any] | None = None
-        self.heard: list[Any] = []
+        self._replayed: Iterator[Any] | None = None
+        self.noted: list[Any] = []
         self.latched_ns = 0
 
     @property
     def now_ns(self) -> int:
         """The time of the next access."""
-        return self._memory.now_ns if self._told is None else self.latched_ns
+        return self._memory.now_ns if self._replayed is None else self.latched_ns
 
     def begin(self) -> None:
         """Begin a scan, which has not read or latched yet: nothing of the scan before is in its progress."""
-        self.heard = []
+        self.noted = []
         self.latched_ns = 0
 
-    def tell(self, heard: Sequence[Any], latched_ns: int) -> None:
+    def replay(self, noted: Sequence[Any], latched_ns: int) -> None:
         """Return from now on the values read by a scan that latched at an instant, instead of those in memory."""
-        self._told, self.latched_ns = iter(heard), latched_ns
+        self._replayed, self.latched_ns = iter(noted), latched_ns
 
-    def live(self) -> None:
+    def end_replay(self) -> None:
         """Use memory from now on."""
-        self._told = None
+        self._replayed = None
 
     def latch(self, plan: LatchPlan) -> Latched:
         """Return copies of the planned views."""
-        if self._told is None:
+        if self._replayed is None:
             self.latched_ns = self._memory.now_ns
             values = self._memory.latch(plan)
-            self._tell(self.latched)
+            self._accessed(self.latched)
         else:
-            values = tuple(next(self._told))
-        self.heard.append(values)
+            values = tuple(next(self._replayed))
+        self.noted.append(values)
         return values
 
     def read_now(self, view: int, element: int = 0) -> Value:
         """Return an actual value."""
-        if self._told is None:
+        if self._replayed is None:
             value: Value = self._memory.read_now(view, element)
-            self._tell((view,))
+            self._accessed((view,))
         else:
-            value = next(self._told)
-        self.heard.append(value)
+            value = next(self._replayed)
+        self.noted.append(value)
         return value
 
     def is_forced(self, view: int) -> bool:
         """Return whether a force holds a simple view."""
-        forced: bool = self._memory.is_forced(view) if self._told is None else next(self._told)
-        self.heard.append(forced)
+        forced: bool = self._memory.is_forced(view) if self._replayed is None else next(self._replayed)
+        self.noted.append(forced)
         return forced
 
-    def hear(self, call: Call) -> Any:
+    def outcome_of(self, call: Call) -> Any:
         """Return the result of a call outside the task, or its result when the scan was executed first."""
-        outcome = call() if self._told is None else next(self._told)
-        self.heard.append(outcome)
+        outcome = call() if self._replayed is None else next(self._replayed)
+        self.noted.append(outcome)
         return outcome
 
     def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
         """Write the values that the scan's blocks changed."""
-        if self._told is None:
+        if self._replayed is None:
             self._memory.commit(changes, writer)
-            self._tell([view for view, _ in changes] if self._accesses else ())
+            self._accessed([view for view, _ in changes] if self._accesses else ())
 
     def write_now(
         self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
     ) -> None:
         """Write an actual value."""
-        if self._told is None:
+        if self._replayed is None:
             self._memory.write_now(view, value, writer, element, kind)
-            self._tell((view,))
+            self._accessed((view,))
 
-    def _tell(self, views: Sequence[int]) -> None:
-        """Call the watchers of each of some views for an access."""
+    def _accessed(self, views: Sequence[int]) -> None:
         if self._accesses:
             for view in views:
-                told = self._accesses.get(view)
-                if told is not None:
-                    told()
+                watcher = self._accesses.get(view)
+                if watcher is not None:
+                    watcher()
 
 
 @dataclass(eq=False)
@@ -137,32 +136,9 @@ class ScanInProgress:
             "latched_ns": self.memory.latched_ns,
             "skipped": self.skipped,
             "steps": self.steps,
-            "heard": list(self.memory.heard),
+            "heard": list(self.memory.noted),
         }
 
 
 Begun = tuple[ScanInProgress, ScanRecord | None, Generator[int, None, bool]]
 """A scan that has begun: its data, its record if one is kept, and the compiled form that executes it."""
-
-
-def add_error(entry: LogEntry, log: ErrorLog, scan: ScanInProgress | None) -> None:
-    """Log an error, as that of the scan in progress if there is one."""
-    log.add(entry)
-    if scan is not None:
-        if scan.own_errors is None:
-            scan.own_errors = ErrorLog()
-        scan.own_errors.add(entry)
-
-
-def cleared_errors(log: ErrorLog, scan: ScanInProgress | None, *, inside: bool) -> ErrorLog:
-    """Return what remains of a log that is cleared, from ``inside`` the scan in progress or by the operator.
-
-    If the operator clears it, errors that a scan in progress has logged itself remain (decision).
-    """
-    if scan is None or inside:
-        log.clear()
-        if scan is not None:
-            scan.own_errors = None
-        return log
-    scan.log = None
-    return scan.own_errors.copy() if scan.own_errors else ErrorLog()

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Protocol, cast
 
+from automax_ros.compile.base.functions import text_of
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.types import Latched, Value
@@ -16,11 +17,12 @@ from automax_ros.runtime.memory.registers import BUS_ERROR, Backplane
 from automax_ros.runtime.memory.views import CellCommit, LatchPlan
 from automax_ros.runtime.scan.error_log import ErrorLog
 from automax_ros.runtime.scan.events import Events
-from automax_ros.runtime.scan.printing import format_print
 from automax_ros.runtime.scan.scan_record import ScanRecord
 
+PRINT_ZONE = 14
+"""Columns of a zone of PRINT; a comma advances to the next one (decision)."""
 Call = Callable[[], Any]
-Hear = Callable[[Call], Any]
+OutcomeOf = Callable[[Call], Any]
 """Returns the result of a call outside the task, or its result when the scan was executed first."""
 
 
@@ -32,8 +34,7 @@ def at_once(call: Call) -> Any:
 class Host(Protocol):
     """The task of a ``TaskIo``.
 
-    ``plan`` are the views that a scan latches, ``written`` those that its blocks write; ``present_scan`` is the number
-    of the scan that logs errors.
+    ``plan`` are the views that a scan latches, ``written`` those that its blocks write.
     """
 
     writer: int
@@ -43,9 +44,6 @@ class Host(Protocol):
     written: tuple[int, ...]
     errors: ErrorLog
     printed: deque[str]
-
-    @property
-    def present_scan(self) -> int: ...  # noqa: D102
 
     def log_error(self, line: int, code: int) -> None: ...  # noqa: D102
 
@@ -94,14 +92,32 @@ def register_written(
     return 0
 
 
+def format_print(values: tuple[Value, ...], separators: str) -> str:
+    """Return a line of PRINT: a comma advances to the next zone of 14 columns, a semicolon joins (decision)."""
+    line = ""
+    for value, separator in zip(values, separators, strict=True):
+        line += text_of(value)
+        if separator == ",":
+            line = line.ljust((len(line) // PRINT_ZONE + 1) * PRINT_ZONE)
+    return line
+
+
+MinorLoop = Callable[[tuple[Any, ...], list[Value] | None], Sequence[Value] | None]
+"""Executes the current minor loop of a drive with its inputs and a local DIAG_DATA; None if it writes no outputs."""
+
+
+def _no_loop(inputs: tuple[Any, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG001
+    return None
+
+
 @mypyc_attr(allow_interpreted_subclasses=True)
 class TaskIo:
     """Access of a compiled scan to common memory through one task, to its error log and its printed lines.
 
-    The members are bound once, so that a scan costs no more than the memory itself.
+    Members are bound once, so that a scan costs no more than the memory itself.
     """
 
-    def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
+    def __init__(self, task: Host, memory: ScanMemory, outcome_of: OutcomeOf = at_once) -> None:
         """Bind a task and the memory that its scans work on."""
         self.latch: Callable[[], Latched] = (
             memory.latching(task.plan) if isinstance(memory, Image) else partial(memory.latch, task.plan)
@@ -110,7 +126,8 @@ class TaskIo:
         self._common = memory if isinstance(memory, CommonMemory) else None
         self.cell_commit: CellCommit | None = None if self._common is None else self._common.committing()
         self._memory, self._writer, self._task = memory, task.writer, task
-        self._backplane, self._hear = task.backplane, hear
+        self._backplane, self._outcome_of = task.backplane, outcome_of
+        self.minor_loop: MinorLoop = _no_loop
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
         """Write back the values that blocks changed."""
@@ -140,12 +157,11 @@ class TaskIo:
 
     def set_event(self, name: str) -> None:
         """Set a software event (SET)."""
-        self._hear(lambda: self._task.events.event(name).set(self._memory.now_ns))
+        self._outcome_of(lambda: self._task.events.event(name).set(self._memory.now_ns))
 
     def errors_logged(self) -> bool:
         """Return whether the error log holds an entry (TST_ERRLOG@)."""
-        logged: bool = self._hear(lambda: self._task.errors.count > 0)
-        return logged
+        return bool(self._outcome_of(lambda: self._task.errors.count > 0))
 
     def clear_errors(self) -> None:
         """Clear the error log (CLR_ERRLOG)."""
@@ -159,18 +175,14 @@ class TaskIo:
         """Write a register's word; return 0, or the bus error of a register that does not answer or is not writable."""
         return register_written(self._backplane, self.write_now, slot, register, value)
 
-    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG002
-        """Execute the current minor loop of a drive: a task without one writes no outputs."""
-        return None
-
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class RecordingIo(TaskIo):
     """The same, with everything noted in ``record``."""
 
-    def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
+    def __init__(self, task: Host, memory: ScanMemory, outcome_of: OutcomeOf = at_once) -> None:
         """Bind a task and its memory, with an empty record."""
-        super().__init__(task, memory, hear)
+        super().__init__(task, memory, outcome_of)
         self.record = ScanRecord(0, 0)
         self.latch = self._latch
         self.read_now = self._read_now

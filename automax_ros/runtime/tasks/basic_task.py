@@ -13,11 +13,8 @@ from automax_ros.compile.base.scan_io import Suspension, Wish
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.core.types import DataType
 from automax_ros.language.program import OpenedFile
-from automax_ros.runtime.memory.registers import NO_MODULES, Backplane
-from automax_ros.runtime.memory.views import Memory
-from automax_ros.runtime.scan.channels import CHANNEL_VIEWS, ChannelAccess, Channels, Message
-from automax_ros.runtime.scan.events import Events
-from automax_ros.runtime.scan.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
+from automax_ros.runtime.scan.channels import CHANNEL_VIEWS, Message
+from automax_ros.runtime.scan.task_io import OutcomeOf, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
 
 BURSTS_AT_ONCE = 100
@@ -31,40 +28,35 @@ _READY, _GOING = -1, -2
 class BasicIo(TaskIo):
     """Access of a burst to memory and channels."""
 
-    def __init__(self, task: BasicTask, memory: ScanMemory, hear: Hear = at_once) -> None:
+    def __init__(self, task: BasicTask, memory: ScanMemory, outcome_of: OutcomeOf = at_once) -> None:
         """Bind a task, the memory that its bursts work on, and channels."""
-        super().__init__(task, memory, hear)
+        super().__init__(task, memory, outcome_of)
         self._basic = task
         self._channels = task.channels
 
     def start_every(self, period_ns: int) -> None:
         """Restart the task each period from now on (START EVERY)."""
-        self._hear(lambda: self._basic.start_every(period_ns, self._memory.now_ns))
+        self._outcome_of(lambda: self._basic.start_every(period_ns, self._memory.now_ns))
 
     def open_reader(self, number: int, types: str, depth: int) -> int:
         """Make the task the reader of a channel; return the problem or 0."""
-        name = self._basic.name
-        outcome: int = self._hear(lambda: self._channels.open_reader(number, types, depth, name, self._memory.now_ns))
-        return outcome
+        name, open_reader, memory = self._basic.name, self._channels.open_reader, self._memory
+        return cast(int, self._outcome_of(lambda: open_reader(number, types, depth, name, memory.now_ns)))
 
     def open_writer(self, number: int, types: str) -> int:
         """Find a channel; return 0, the problem, or MUST_WAIT while no task reads it."""
-        outcome: int = self._hear(lambda: self._channels.open_writer(number, types))
-        return outcome
+        return cast(int, self._outcome_of(lambda: self._channels.open_writer(number, types)))
 
     def receive(self, number: int) -> tuple[Message, int]:
         """Receive the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
-        types, name = self._basic.types(number), self._basic.name
-        received: tuple[Message, int] = self._hear(
-            lambda: self._channels.receive(number, types, name, self._memory.now_ns)
-        )
-        return received
+        types, name, memory = self._basic.types(number), self._basic.name, self._memory
+        received = self._outcome_of(lambda: self._channels.receive(number, types, name, memory.now_ns))
+        return cast(tuple[Message, int], received)
 
     def send(self, number: int, message: Message) -> int:
         """Send a message to a channel; return 0, the problem, or MUST_WAIT if it is full."""
         types = self._basic.types(number)
-        outcome: int = self._hear(lambda: self._channels.send(number, types, message, self._memory.now_ns))
-        return outcome
+        return cast(int, self._outcome_of(lambda: self._channels.send(number, types, message, self._memory.now_ns)))
 
 
 class RecordingBasicIo(BasicIo, RecordingIo):
@@ -114,27 +106,9 @@ class BasicTask(Task):
     wish: Wish
     every: tuple[int, int, int] | None
 
-    def __init__(
-        self,
-        compiled: CompiledTask,
-        memory: Memory,
-        *,
-        writer: int = 0,
-        slot: int = 0,
-        priority: int = 11,
-        backplane: Backplane = NO_MODULES,
-        events: Events | None = None,
-        channels: ChannelAccess | None = None,
-    ) -> None:
-        """Install the task; without ``events`` and ``channels`` it gets its own."""
-        self.channels: ChannelAccess = Channels() if channels is None else channels
-        self.suspended: Callable[[], None] = _nothing
-        super().__init__(
-            compiled, memory, writer=writer, slot=slot, priority=priority, backplane=backplane, events=events
-        )
-
     def install(self, compiled: CompiledTask) -> None:
         """Install this or another program, as at the beginning."""
+        self.suspended: Callable[[], None] = _nothing
         self._files = {item.number: item for item in compiled.program.files}
         self._types = {
             number: "".join(kind.value or "." for kind in item.types) for number, item in self._files.items()
@@ -245,7 +219,6 @@ class BasicTask(Task):
         return cast(ScanSteps, self.compiled.burst_steps)
 
     def _over(self, outcome: Wish, began_ns: int) -> None:
-        """End a burst: note what the task waits for."""
         self.wish, (kind, number), now_ns = outcome, outcome, self.memory.now_ns
         if kind == Suspension.STOP or outcome == (Suspension.END, 0):
             self.status = Status.ENDED
@@ -272,8 +245,8 @@ class BasicTask(Task):
         tick = self.compiled.program.tick_ns
         return (now_ns // tick + 1) * tick
 
-    def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
-        return RecordingBasicIo(self, memory, hear) if self._recording else BasicIo(self, memory, hear)
+    def _make_io(self, memory: ScanMemory, outcome_of: OutcomeOf) -> TaskIo:
+        return RecordingBasicIo(self, memory, outcome_of) if self._recording else BasicIo(self, memory, outcome_of)
 
 
 def awaits(task: Task, event: str) -> bool:

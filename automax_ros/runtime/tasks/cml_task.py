@@ -19,15 +19,12 @@ from automax_ros.drive.current_loop.outputs import PAGE_NUMBER, SIZE, Record, ne
 from automax_ros.drive.current_loop.signals import Command, Measured
 from automax_ros.language.program import BoundCall
 from automax_ros.language.tree.tree import Reference, Scope
-from automax_ros.runtime.memory.registers import NO_MODULES, Backplane
-from automax_ros.runtime.memory.views import Memory
 from automax_ros.runtime.scan.drive_record import noted_command, noted_measured, noted_time
-from automax_ros.runtime.scan.drives import DriveAccess, DrivePort, Drives
+from automax_ros.runtime.scan.drives import DrivePort
 from automax_ros.runtime.scan.error_log import LOG_NUMBERS
-from automax_ros.runtime.scan.events import Events
 from automax_ros.runtime.scan.scan_in_progress import Begun
 from automax_ros.runtime.scan.scan_record import ScanRecord, Status
-from automax_ros.runtime.scan.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
+from automax_ros.runtime.scan.task_io import OutcomeOf, RecordingIo, ScanMemory, TaskIo
 from automax_ros.runtime.tasks.task import Task
 
 _TRUE_INPUTS = ("SPEED_FDBK", "OSV_FDBK")
@@ -51,9 +48,8 @@ Sensed = tuple[int, Measured, Sequence[Under]]
 class _LoopScans:
     """The minor loop's part of the scans that one ``io`` executes; the record of ``io`` contains all of it."""
 
-    def __init__(self, task: CmlTask, io: TaskIo, memory: ScanMemory, hear: Hear) -> None:
-        """Take part in the scans of an ``io``, whose latches are timed from now on."""
-        self._task, self._io, self._memory, self._hear = task, io, memory, hear
+    def __init__(self, task: CmlTask, io: TaskIo, memory: ScanMemory, outcome_of: OutcomeOf) -> None:
+        self._task, self._io, self._memory, self._outcome_of = task, io, memory, outcome_of
         self._recording = io if isinstance(io, RecordingIo) else None
         self._latched_ns = 0
         self._command = Command(0)
@@ -67,7 +63,7 @@ class _LoopScans:
         Returns the outputs without DIAG_DATA in their order, None if none is written.
         """
         task, recording = self._task, self._recording
-        now_ns, measured, under = self._hear(self._sense)
+        now_ns, measured, under = self._outcome_of(self._sense)
         if type(measured) is not Measured:
             measured = Measured(*measured)
         for place, view, value in under:
@@ -81,7 +77,7 @@ class _LoopScans:
             reads += noted_measured(measured)
             reads += noted_time(now_ns)
             reads += noted_command(outcome.command)
-        self._hear(self._give)
+        self._outcome_of(self._give)
         if outcome.initialised:
             self._clear(records)
         for code in outcome.problems:
@@ -103,8 +99,7 @@ class _LoopScans:
             port.watch_speed(self._task.loop.overspeed_counts)
         port.command(self._command)
 
-    def _clear(self, records: list[Value] | None) -> None:
-        """Zero the diagnostic data at task initialisation (52.2.2)."""
+    def _clear(self, records: list[Value] | None) -> None:  # at task initialisation (52.2.2)
         view = self._task.records
         if records is not None:
             records[:] = [0] * len(records)
@@ -112,8 +107,7 @@ class _LoopScans:
             for index in range(SIZE):
                 self._io.write_now(view, 0, index)
 
-    def _keep(self, record: Record, records: list[Value] | None) -> None:
-        """Write a record of the diagnostic data: to a local array, or to a common in actual memory (52.3.2)."""
+    def _keep(self, record: Record, records: list[Value] | None) -> None:  # local or common (52.3.2)
         view, io = self._task.records, self._io
         if records is not None:
             page = page_of(int(records[PAGE_NUMBER]))
@@ -125,59 +119,14 @@ class _LoopScans:
                 io.write_now(view, value, index)
 
 
-class CmlIo(TaskIo):
-    """Access of a scan of a current minor loop task to memory and drive."""
-
-    def __init__(self, task: CmlTask, memory: ScanMemory, hear: Hear = at_once) -> None:
-        """Bind a task and the memory that its scans work on."""
-        super().__init__(task, memory, hear)
-        self._loop = _LoopScans(task, self, memory, hear)
-
-    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:
-        """Execute a scan of the loop."""
-        return self._loop.scan(inputs, records)
-
-
-class RecordingCmlIo(RecordingIo):
-    """The same, with everything noted, measurement and command among the reads."""
-
-    def __init__(self, task: CmlTask, memory: ScanMemory, hear: Hear = at_once) -> None:
-        """Bind a task and the memory that its scans work on."""
-        super().__init__(task, memory, hear)
-        self._loop = _LoopScans(task, self, memory, hear)
-
-    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:
-        """Execute a scan of the loop."""
-        return self._loop.scan(inputs, records)
-
-
 class CmlTask(Task):
     """A task that runs the current minor loop of a drive.
 
-    ``cml`` is its CALL; ``records`` is the view of a common DIAG_DATA, None without one; ``true_inputs`` are place in
-    ``Inputs`` and view of the commons for which the loop ignores forces.
+    ``cml`` is its CALL; ``records`` the view of a common DIAG_DATA, if any; ``true_inputs`` are place in ``Inputs`` and
+    view of the commons for which the loop ignores forces.
     """
 
     cml: BoundCall
-
-    def __init__(
-        self,
-        compiled: CompiledTask,
-        memory: Memory,
-        *,
-        writer: int = 0,
-        slot: int = 0,
-        priority: int = 11,
-        backplane: Backplane = NO_MODULES,
-        events: Events | None = None,
-        drives: DriveAccess | None = None,
-    ) -> None:
-        """Install the task; without ``drives`` there is no line."""
-        self._drives: DriveAccess = Drives() if drives is None else drives
-        self._before: list[float] | None = None
-        super().__init__(
-            compiled, memory, writer=writer, slot=slot, priority=priority, backplane=backplane, events=events
-        )
 
     def install(self, compiled: CompiledTask) -> None:
         """Install this or another program of such a task, as at the beginning."""
@@ -189,6 +138,7 @@ class CmlTask(Task):
         views = ((INPUTS.index(name), self._common(name, compiled)) for name in _TRUE_INPUTS)
         self.true_inputs = tuple((place, view) for place, view in views if view is not None)
         self._port: DrivePort | None = None
+        self._before: list[float] | None = None
         self._inputs_forced = self._any_forced()
         self.loop = CurrentMinorLoop(tests_scrs=_SCR_TEST in cml.arguments)
         super().install(compiled)
@@ -281,25 +231,25 @@ class CmlTask(Task):
             self.loop.take(before)
             raise
 
-    def _look_at_forces(self) -> None:
-        super()._look_at_forces()
+    def _check_forces(self) -> None:
+        super()._check_forces()
         self._inputs_forced = self._any_forced()
 
     def _any_forced(self) -> bool:
         return any(self.memory.is_forced(view) for _, view in self.true_inputs)
 
     def _follow_end(self) -> None:
-        """Stop the drive at once if the task does not run any more."""
         if self.status is not Status.RUNNING:
             self.port.disarm()
 
     def _common(self, keyword: str, compiled: CompiledTask) -> int | None:
-        """Return the view of the common that a parameter names; None if it names none."""
         given = self.cml.arguments.get(keyword)
         if not isinstance(given, Reference):
             return None
         symbol = compiled.program.symbols[given.name]
         return self.memory.view(symbol.name) if symbol.scope is Scope.COMMON else None
 
-    def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
-        return RecordingCmlIo(self, memory, hear) if self._recording else CmlIo(self, memory, hear)
+    def _make_io(self, memory: ScanMemory, outcome_of: OutcomeOf) -> TaskIo:
+        io = super()._make_io(memory, outcome_of)
+        io.minor_loop = _LoopScans(self, io, memory, outcome_of).scan
+        return io

@@ -13,17 +13,14 @@ from automax_ros.runtime.scan.events import Event, Events
 from automax_ros.runtime.tasks.basic_task import awaits
 from automax_ros.runtime.tasks.task import Status, Task
 
-_Iscr = tuple[int, int]
-"""The view of a module's bank, the register."""
-
 
 class Interrupts:
-    """The interrupts of one rack."""
+    """The interrupts of one rack; an ISCR is the view of a module's bank with a register."""
 
     def __init__(self, memory: CommonMemory, events: Events) -> None:
         """Create it without hardware events."""
         self._memory, self._events = memory, events
-        self._bound: dict[_Iscr, dict[tuple[int, str, str], tuple[Task, Event]]] = {}
+        self._bound: dict[tuple[int, int], dict[tuple[int, str, str], tuple[Task, Event]]] = {}
         self._watchers: list[Callable[[], None]] = []
 
     def bind(self, task: Task) -> None:

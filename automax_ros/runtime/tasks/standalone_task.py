@@ -61,15 +61,13 @@ class StandaloneTask:
         if symbol.scope is Scope.COMMON:
             view = self._views[symbol.name]
             read = partial(self.memory.read_now, view, index)
-            return LoneVariable(label, symbol, read, partial(self._write_common, view, index))
+            write = partial(self.memory.write_from_outside, view, writer=_OUTSIDE, element=index)
+            return LoneVariable(label, symbol, read, write)
         position = self.task.compiled.layout.index(symbol.name)
         read = partial(self._read_local, position, index)
         if symbol.tuning is not None:
             return LoneVariable(label, symbol, read, partial(self._tune, _spec(symbol)))
         return LoneVariable(label, symbol, read, partial(self._write_local, position, index, _spec(symbol)))
-
-    def _write_common(self, view: int, element: int, value: Value) -> None:
-        self.memory.write_from_outside(view, value, _OUTSIDE, element)
 
     def _tune(self, spec: ViewSpec, value: Value) -> None:
         self.task.tune(spec.name, fitting(spec, value))

@@ -15,20 +15,15 @@ from automax_ros.language.tree.tree import Scope
 from automax_ros.runtime.memory.image import Image
 from automax_ros.runtime.memory.registers import NO_MODULES, Backplane
 from automax_ros.runtime.memory.views import Memory
+from automax_ros.runtime.scan.channels import ChannelAccess, Channels
+from automax_ros.runtime.scan.drives import DriveAccess, Drives
 from automax_ros.runtime.scan.error_log import LOG_NUMBERS, ErrorLog, LogEntry, snapshot_layout
 from automax_ros.runtime.scan.events import Events
-from automax_ros.runtime.scan.modeled_scan import scan_in_steps
-from automax_ros.runtime.scan.scan_in_progress import (
-    Begun,
-    Progress,
-    ReplayableReads,
-    ScanInProgress,
-    add_error,
-    cleared_errors,
-)
+from automax_ros.runtime.scan.scan_in_progress import Begun, Progress, ReplayableReads, ScanInProgress
 from automax_ros.runtime.scan.scan_record import ScanRecord, Status, Steps
-from automax_ros.runtime.scan.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
+from automax_ros.runtime.scan.task_io import OutcomeOf, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.runtime.scan.tunable_value import tunable_value
+from automax_ros.runtime.tasks.modeled_scan import scan_in_steps
 
 __all__ = ["EVENT_TIMEOUT", "OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task"]
 
@@ -58,19 +53,23 @@ class Task:
         priority: int = 11,
         backplane: Backplane = NO_MODULES,
         events: Events | None = None,
+        channels: ChannelAccess | None = None,
+        drives: DriveAccess | None = None,
     ) -> None:
-        """Install the task: its state is as at installation (2.4.5)."""
+        """Install the task (2.4.5); without ``events``, ``channels`` and ``drives`` it gets its own."""
         self.memory = memory
         self._image: Image | None = memory if isinstance(memory, Image) else None
         self.writer, self.slot, self.priority = writer, slot, priority
         self.backplane, self.events = backplane, Events() if events is None else events
+        self.channels: ChannelAccess = Channels() if channels is None else channels
+        self._drives: DriveAccess = Drives() if drives is None else drives
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
         self._recording = False
         self._scans: Generator[bool, None, None] | None = None
-        self._heard = ReplayableReads(memory)
+        self._replayable = ReplayableReads(memory)
         self._under_way: ScanInProgress | None = None
         self.install(compiled)
-        memory.watch_forces(self._look_at_forces)
+        memory.watch_forces(self._check_forces)
 
     def install(self, compiled: CompiledTask) -> None:
         """Install this or another program: state and error log are as at installation (2.4.5)."""
@@ -79,7 +78,7 @@ class Task:
         self.forces: dict[str, Value] = {}
         self._forces_wait = False
         latched = [self.memory.view(name) for name in compiled.latched]
-        self.plan, self._heard.latched = self.memory.plan(latched), latched
+        self.plan, self._replayable.latched = self.memory.plan(latched), latched
         self.written = tuple(self.memory.view(name) for name in compiled.written)
         self._state: StateValues = compiled.layout.fresh()
         self._arrays = [position for position, field in enumerate(compiled.layout.fields) if field.is_array]
@@ -108,8 +107,8 @@ class Task:
     def state(self) -> StateValues:
         """The state, field by field as in ``compiled.layout``.
 
-        Between scans the compiled scan holds it, so get it again after each scan: an earlier list is out of date. While
-        a modeled scan is in progress it is the state after the scan before.
+        Get it again after each scan: an earlier list is out of date. While a modeled scan is in progress it is the
+        state after the scan before.
         """
         self._put_down()
         return self._state
@@ -184,10 +183,9 @@ class Task:
     def scan_modeled(self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None) -> Steps:
         """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
 
-        It yields the ns that pass before the next memory access and is sent the time then, None if it is unchanged;
-        with another ``form`` of the scan, what that yields. State and number of the scan become the task's when the
-        generator has ended; closed before that, it leaves them as they were (decision: what it has written stays
-        written).
+        It yields the ns that pass before the next memory access (with another ``form`` of the scan, what that yields)
+        and is sent the time then, None if it is unchanged. State and number of the scan become the task's at its end;
+        closed before that, it leaves them as they were (decision: what it has written stays written).
         """
         return scan_in_steps(self, now_ns, skipped, form)
 
@@ -195,15 +193,17 @@ class Task:
         """Begin a scan in steps; the task must be in RUN: see ``scan_modeled``."""
         self.heed_forces()
         self._put_down()
-        self._heard.begin()
-        self._under_way = scan = ScanInProgress(now_ns, skipped, self._state[:], None, self._heard)
-        if self._arrays:
-            self._copy_arrays(scan.state)
+        self._replayable.begin()
+        self._under_way = scan = ScanInProgress(now_ns, skipped, self._state[:], None, self._replayable)
+        for position in self._arrays:  # the copy has its own
+            array = scan.state[position]
+            assert isinstance(array, list)
+            scan.state[position] = array[:]
         if self.errors.count:
             scan.log = self.errors.copy()
-        record = self._begin_record(now_ns, skipped, self._heard_io) if self._recording else None
+        record = self._begin_record(now_ns, skipped, self._replayable_io) if self._recording else None
         self._begins(now_ns)
-        return scan, record, (form or self._form_in_steps())(scan.state, self._heard_io)
+        return scan, record, (form or self._form_in_steps())(scan.state, self._replayable_io)
 
     def end_steps(self, outcome: Any) -> None:
         """End the scan in progress with the result of its compiled form: TRUE if the task executed STOP."""
@@ -231,8 +231,8 @@ class Task:
         for number in range(progress["steps"]):
             next(steps)
             if not number:
-                self._heard.tell(progress["heard"], progress["latched_ns"])
-        self._heard.live()
+                self._replayable.replay(progress["heard"], progress["latched_ns"])
+        self._replayable.end_replay()
         self.memory.now_ns = now_ns
         return steps
 
@@ -251,11 +251,26 @@ class Task:
 
     def log_error(self, line: int, code: int) -> None:
         """Log a run-time error of the scan in progress."""
-        add_error(LogEntry(line, code, self.present_scan), self.errors, self._under_way)
+        entry, scan = LogEntry(line, code, self.present_scan), self._under_way
+        self.errors.add(entry)
+        if scan is not None:
+            if scan.own_errors is None:
+                scan.own_errors = ErrorLog()
+            scan.own_errors.add(entry)
 
     def clear_errors(self, *, inside: bool = False) -> None:
-        """Clear the error log, from ``inside`` a scan or as the operator does."""
-        self.errors = cleared_errors(self.errors, self._under_way, inside=inside)
+        """Clear the error log, from ``inside`` a scan or as the operator does.
+
+        If the operator clears it, errors that a scan in progress has logged itself remain (decision).
+        """
+        scan = self._under_way
+        if scan is None or inside:
+            self.errors.clear()
+            if scan is not None:
+                scan.own_errors = None
+        else:
+            scan.log = None
+            self.errors = scan.own_errors.copy() if scan.own_errors else ErrorLog()
 
     def snapshot(self) -> list[Value]:
         """Return the task's state as flat values, in the order of ``layout``."""
@@ -281,12 +296,7 @@ class Task:
         return self.state[self.compiled.layout.index(name)]
 
     def tune(self, name: str, value: object) -> None:
-        """Set a tunable, as the operator does (2.4.5).
-
-        Raises:
-            KeyError: the task has no tunable of that name.
-            ValueError: the value lies outside its limits or is not of its type.
-        """
+        """Set a tunable, as the operator does (2.4.5); raises what ``tuning`` does."""
         position, fitting = self.compiled.layout.index(name), self.tuning(name, value)
         self.state[position] = fitting
         if self._under_way is not None:
@@ -340,8 +350,7 @@ class Task:
         for name, value in self.forces.items():
             self._state[self.compiled.layout.index(name)] = value
 
-    def _look_at_forces(self) -> None:
-        """Scan from now on in the form that respects forces, or in the fast one."""
+    def _check_forces(self) -> None:  # scan in the form that respects forces, or in the fast one
         self._put_down()
         self._forced = any(map(self.memory.is_forced, self.written))
 
@@ -354,25 +363,15 @@ class Task:
         if numbers:
             raise ValueError(f"task {self.name} cannot wait: only a BASIC task can")
 
-    def _put_down(self) -> None:
-        """Make the compiled scan store the state that it holds."""
+    def _put_down(self) -> None:  # the compiled scan stores the state that it holds
         if self._scans is not None:
             self._scans.close()
             self._scans = None
 
-    def _copy_arrays(self, state: StateValues) -> None:
-        """Give a copy of the state its own arrays."""
-        for position in self._arrays:
-            array = state[position]
-            assert isinstance(array, list)
-            state[position] = array[:]
-
     def _begins(self, now_ns: int) -> None:
-        """Begin a scan at an instant."""
         self.memory.now_ns = now_ns
 
     def _form_in_steps(self) -> ScanSteps:
-        """Return the compiled form of a scan in steps."""
         return self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
 
     def _over(self, outcome: Any, began_ns: int) -> None:  # noqa: ARG002
@@ -380,15 +379,14 @@ class Task:
         self.status = Status.ENDED
 
     def _bind(self) -> None:
-        """Bind the access of scans: to memory itself, and for modeled scans to memory with noted reads."""
-        self._io, self._heard_io = self._make_io(self.memory, at_once), self._make_io(self._heard, self._heard.hear)
+        self._io = self._make_io(self.memory, at_once)
+        self._replayable_io = self._make_io(self._replayable, self._replayable.outcome_of)
         self._noting = self._io if isinstance(self._io, RecordingIo) else None
 
-    def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
-        return RecordingIo(self, memory, hear) if self._recording else TaskIo(self, memory, hear)
+    def _make_io(self, memory: ScanMemory, outcome_of: OutcomeOf) -> TaskIo:
+        return RecordingIo(self, memory, outcome_of) if self._recording else TaskIo(self, memory, outcome_of)
 
     def _begin_record(self, now_ns: int, skipped: int, io: TaskIo) -> ScanRecord | None:
-        """Return a new record for a scan, or None if none is kept."""
         if not isinstance(io, RecordingIo):
             return None
         io.record = ScanRecord(now_ns, self.present_scan, skipped=skipped)
@@ -396,5 +394,5 @@ class Task:
 
     def too_long(self, error: ScanTooLong) -> None:
         """Fault the task for a scan that takes too long."""
-        (self._io if self._under_way is None else self._heard_io).log(error.line, SCAN_TOO_LONG)
+        (self._io if self._under_way is None else self._replayable_io).log(error.line, SCAN_TOO_LONG)
         self.status = Status.FAULTED

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType
 from automax_ros.runtime.memory.memory import CommonMemory
-from automax_ros.runtime.memory.private_image import PrivateImage
+from automax_ros.runtime.memory.private_image import LocalMemory, PrivateImage
 from automax_ros.runtime.memory.registers import Backplane, Bank
 from automax_ros.runtime.memory.views import Place, ViewSpec
 from automax_ros.runtime.tasks.task import Task
@@ -213,29 +213,29 @@ def test_a_private_image_is_a_copy_until_it_is_copied_out():
     common.drain()
     image = PrivateImage(SPECS, common)
     assert image.read_now(WORD) == 0
-    image.copy_in([WORD, BANK, LOW, HIGH])
+    image.take([(WORD, 0), (BANK, 1), (LOW, 0), (HIGH, 0)])
     assert (image.read_now(WORD), image.read_now(LOW), image.read_now(BANK, 1)) == (3, True, 3)
     image.commit([(PLAIN, 9), (LOW, False)], WRITER)
     assert (image.latch(image.plan([WORD, PLAIN])), common.read_now(PLAIN), common.drain()) == ((2, 9), 0, [])
-    image.copy_out([PLAIN, WORD], WRITER)
+    image.give([(PLAIN, 0), (WORD, 0)], WRITER)
     assert [(entry.kind, entry.view, entry.value) for entry in common.drain()][:2] == [
         (WriteKind.COMMIT, PLAIN, 9),
         (WriteKind.COMMIT, WORD, 2),
     ]
-    image.copy_out([PLAIN, WORD], WRITER)
+    image.give([(PLAIN, 0), (WORD, 0)], WRITER)
     assert common.drain() == []
 
 
-def test_a_task_runs_on_a_private_image_and_a_force_holds_there_too():
+def test_a_task_runs_on_local_memory_and_a_force_holds_there_too():
     text = lines("CALL MOVE(INPUT1=5, OUTPUT1=PLAIN%)", "A% = PLAIN%", declare="COMMON PLAIN%\n11 LOCAL A%")
     common = CommonMemory([SPECS[PLAIN]])
-    image = PrivateImage(common.specs, common)
-    task = Task(compiled_of(text), image)
+    memory = LocalMemory(common, {0})
+    task = Task(compiled_of(text), memory)
     task.run()
     task.scan(0)
     task.scan(1)
     assert (task.value("A%"), common.read_now(0)) == (5, 0)
     common.force(0, 8)
-    image.copy_in([0])
+    memory.image.take([(0, 0)])
     task.scan(2)
-    assert (task.value("A%"), image.read_now(0)) == (8, 8)
+    assert (task.value("A%"), memory.image.read_now(0)) == (8, 8)
