@@ -13,7 +13,6 @@ from collections.abc import Callable, Collection, Sequence
 
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.kinds import WriterKind
 from automax_ros.core.names import Element, NameFault
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
@@ -22,7 +21,7 @@ from automax_ros.rack.base.observers import Observers, RackObserver
 from automax_ros.rack.base.part import RackPart
 from automax_ros.rack.base.views import backplane_of, view_specs
 from automax_ros.rack.modules.building import build_module
-from automax_ros.rack.modules.module import Module, RackServices
+from automax_ros.rack.modules.module import Module
 from automax_ros.rack.operations.forces import Force, ForceTable, Target
 from automax_ros.rack.operations.operations import Operations, begin_memory
 from automax_ros.rack.operations.values import ValueOperations
@@ -31,11 +30,10 @@ from automax_ros.rack.plants.plants import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
 from automax_ros.rack.state import RackState, digest_of
 from automax_ros.rack.tasks.installation import Finding, Installation
-from automax_ros.rack.tasks.installer import Installer
 from automax_ros.rack.tasks.scheduled_task import ScanEnd, ScheduledTask
+from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rack.tasks.statistics import TaskStatistics
 from automax_ros.rackfile.model.config import RackConfig, Timing
-from automax_ros.rackfile.model.plants import full_speeds
 from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER, WriterSpec, writers_of
 from automax_ros.runtime.memory.common_clock import CommonClock
@@ -92,7 +90,7 @@ class Rack:
         self.plants = RackPlants(self.part.plants)
         self.sampling = PlantSampling(self.plants, self.scheduler)
         self._feeds = PlantFeeds(config, self.plants, self.memory, self.inputs, self.scheduler)
-        installer = Installer(
+        services = RackServices(
             config=config,
             installation=installation,
             memory=self.memory,
@@ -100,29 +98,18 @@ class Rack:
             backplane=self.backplane,
             events=self.events,
             channels=self.channels,
-            drives=self.drives,
-            interrupts=self._interrupts,
-            after=ScanEnd(self.observers, self.inputs, self._stop_all).ended,
-            no_event=self._no_event,
-            stopwatch=stopwatch,
-        )
-        parts = RackServices(
-            memory=self.memory,
-            scheduler=self.scheduler,
-            backplane=self.backplane,
-            events=self.events,
             clock=self._clock,
             interrupts=self._interrupts,
             inputs=self.inputs,
             drives=self.drives,
-            install=installer.install,
-            execution=self._execution if execution is None else lambda _: execution,
-            tell_writes=self.observers.tell_writes,
-            writer={item.name: item.id for item in self.writers if item.kind is WriterKind.IO}.__getitem__,
             plants=self.plants,
-            full_speeds=full_speeds(config.feeds),
+            execution=self._execution if execution is None else lambda _: execution,
+            after=ScanEnd(self.observers, self.inputs, self._stop_all).ended,
+            no_event=self._no_event,
+            tell_writes=self.observers.tell_writes,
+            stopwatch=stopwatch,
         )
-        self.modules: list[Module] = [build_module(module, parts) for module in self.part.modules]
+        self.modules: list[Module] = [build_module(module, services) for module in self.part.modules]
         self.operations = Operations(
             config,
             self.modules,

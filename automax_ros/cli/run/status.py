@@ -14,8 +14,8 @@ from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.core.values import value_text
+from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.modules.module import Module
-from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.runtime.health import Health
@@ -217,7 +217,7 @@ class StatusDisplay:
     def _notes(self) -> Iterator[str]:
         """Yield the summary's lines about interrupts and errors."""
         for module in self._rack.modules if self._live else ():
-            if isinstance(module, Timed) and module.timing.interrupts:
+            if isinstance(module, DriveControllerModule) and module.timing.interrupts:
                 yield f"  {module.config.name}: {module.timing.describe()}"
         for task in self._rack.tasks:
             for entry in task.errors.entries:

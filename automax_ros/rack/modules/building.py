@@ -8,11 +8,12 @@ from typing import Any
 from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.modules.drive_io import DriveAnalogModule
 from automax_ros.rack.modules.io_module import IoModule
-from automax_ros.rack.modules.module import Module, QuietModule, RackServices
+from automax_ros.rack.modules.module import Module, ProcessorModule, QuietModule
 from automax_ros.rack.modules.network import NetworkModule
-from automax_ros.rack.modules.processor import ProcessorModule
 from automax_ros.rack.modules.udc import UdcModule
+from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.model.plants import full_speeds
 from automax_ros.rackfile.modules.common_memory import CommonMemoryConfig
 from automax_ros.rackfile.modules.drive import DriveAnalogConfig, DriveConfig
 from automax_ros.rackfile.modules.io import IoConfig
@@ -29,24 +30,20 @@ def build_module(config: ModuleConfig, parts: RackServices) -> Module:
 def _processor(config: ProcessorConfig, parts: RackServices) -> Module:
     in_order = sorted(config.tasks, key=lambda item: (item.priority, item.name))
     execution = parts.execution(config.name)
-    return ProcessorModule(config, [parts.install(item, execution) for item in in_order])
+    return ProcessorModule(config, tasks=[parts.install(item, execution) for item in in_order])
 
 
 def _drive(config: DriveConfig, parts: RackServices) -> Module:
     plant = None if config.plant is None else parts.plants.get(config.plant.name)
-    full_rpm = None if config.plant is None else parts.full_speeds.get(config.plant.name)
+    full_rpm = None if config.plant is None else full_speeds(parts.config.feeds).get(config.plant.name)
     return DriveControllerModule(config, parts, plant, full_rpm)
 
 
 def _drive_analog(config: DriveAnalogConfig, parts: RackServices) -> Module:
     module = DriveAnalogModule(config, parts)
     if config.drive is not None:
-        parts.drives.wire_voltage(config.drive, module.feel)
+        parts.drives.wire_voltage(config.drive, module.show_voltage)
     return module
-
-
-def _network(config: NetworkConfig, parts: RackServices) -> Module:
-    return NetworkModule(config, config.network, config.drop, parts)
 
 
 _BUILDERS: dict[type, Callable[[Any, RackServices], Module]] = {
@@ -56,6 +53,6 @@ _BUILDERS: dict[type, Callable[[Any, RackServices], Module]] = {
     IoConfig: IoModule,
     DriveConfig: _drive,
     DriveAnalogConfig: _drive_analog,
-    NetworkConfig: _network,
+    NetworkConfig: NetworkModule,
     UdcConfig: UdcModule,
 }

@@ -41,8 +41,9 @@ from automax_ros.drive.current_loop.signals import (
 from automax_ros.drive.plant.controller import DriveController
 from automax_ros.drive.plant.plant import DrivePlant
 from automax_ros.rack.modules.drive_io import DriveDigital
-from automax_ros.rack.modules.module import ModuleState, RackServices
+from automax_ros.rack.modules.module import ModuleState
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
+from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.drive import ACCESS_NS, DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
@@ -51,8 +52,6 @@ USUAL_NS = 2_777_778
 """Time between two interrupts until a task sets it, ns: a sixth of a cycle at 60 Hz (decision)."""
 LATE_NS = 1_000_000
 """An interrupt later than this counts as late, ns."""
-
-
 PRESSED_NS = 500_000_000
 """Time for which the fault reset switch is pressed, ns (decision)."""
 TEST_SWITCH, FAULT_RESET_SWITCH = "test_switch", "fault_reset_switch"
@@ -69,12 +68,9 @@ REST_NS = 5_500_000
 
 @dataclass
 class InterruptTiming:
-    """Lateness of interrupts on the wall clock; in simulated time none is late.
+    """Lateness of interrupts on the wall clock: how many came, how many of them more than ``LATE_NS`` late.
 
-    Attributes:
-        interrupts: how many there were.
-        late: how many came more than ``LATE_NS`` after their instant.
-        greatest_ns: the greatest lateness, ns.
+    In simulated time none is late.
     """
 
     interrupts: int = 0
@@ -97,9 +93,7 @@ class InterruptTiming:
 class DriveInterrupts:
     """Interrupts from ``arm`` to ``disarm``. One that a late host missed is executed late, in order (decision).
 
-    Attributes:
-        at_ns: when the last one was, ns.
-        interval_ns: time from one to the next as the last command set it, ns.
+    ``at_ns`` is when the last one was, ``interval_ns`` the time from one to the next as the last command set it.
     """
 
     def __init__(self, scheduler: Scheduler, slot: int, measure: Callable[[int], None]) -> None:
@@ -176,7 +170,7 @@ class DriveInterrupts:
 
 
 def _nothing(now_ns: int, skipped: int) -> None:
-    """Make no scan due: the interrupts are not armed."""
+    """Do nothing: the interrupts are not armed."""
 
 
 class FrontSwitches:
@@ -198,26 +192,25 @@ class FrontSwitches:
         if switch == TEST_SWITCH:
             self._test = position
         else:
-            self._let_go(0)
+            self._end_press(0)
             if position == "true":
                 self._press(self._scheduler.now_ns + PRESSED_NS)
 
     def state(self) -> dict[str, object]:
         """Return their positions, and when the fault reset switch is released, ns."""
-        until_ns = None if self._release is None else self._scheduler.due_ns(self._release)
-        return {"test": self._test, "pressed_until_ns": until_ns}
+        return {"test": self._test, "pressed_until_ns": self._scheduler.due_ns(self._release)}
 
     def load(self, state: ModuleState) -> None:
         """Restore a state."""
-        self._let_go(0)
+        self._end_press(0)
         self._test = state["test"]
         if state["pressed_until_ns"] is not None:
             self._press(state["pressed_until_ns"])
 
     def _press(self, until_ns: int) -> None:
-        self._release = self._scheduler.at(until_ns, self._key, self._let_go)
+        self._release = self._scheduler.at(until_ns, self._key, self._end_press)
 
-    def _let_go(self, _: int) -> None:
+    def _end_press(self, _: int) -> None:
         if self._release is not None:
             self._release.cancel()
             self._release = None
@@ -259,8 +252,6 @@ class DriveControllerModule:
         """Lateness of the interrupts."""
         return self._interrupts.timing
 
-    # As a module
-
     def power_on(self) -> None:
         """Start the plant's time; gates stay off until a task arms the module."""
         if not self._interrupts.armed:
@@ -277,14 +268,13 @@ class DriveControllerModule:
 
     def state(self) -> ModuleState:
         """Return the last measurement, the switches and when it interrupts; the plant has a state of its own."""
-        rest_ns = None if self._rest is None else self._scheduler.due_ns(self._rest)
         return {
             "interrupts": self._interrupts.state(),
             "switches": self._switches.state(),
             "measured": list(self._measured),
             "firing": self._controller.state(),
             "digital": self._digital.slot,
-            "rest_ns": rest_ns,
+            "rest_ns": self._scheduler.due_ns(self._rest),
             "accesses": self._accesses,
             "delayed": self._delayed_state(),
         }
@@ -305,8 +295,6 @@ class DriveControllerModule:
             due_ns, (next_ns, relays, pulses, level, block, ok) = state["delayed"]
             self._delay(Command(next_ns, relays, tuple(Pulse(*pulse) for pulse in pulses), level, block, ok), due_ns)
 
-    # As something that an operator handles
-
     @property
     def controls(self) -> Mapping[str, tuple[str, ...]]:
         """The switches on its front, with their positions."""
@@ -315,8 +303,6 @@ class DriveControllerModule:
     def operate(self, verb: str, value: str) -> None:
         """Move a switch."""
         self._switches.move(verb, value)
-
-    # As the port of a CML task
 
     @property
     def next_ns(self) -> int | None:
@@ -385,23 +371,19 @@ class DriveControllerModule:
         self._accesses += 1
 
     def _delay(self, command: Command, due_ns: int) -> None:
-        """Delay a command until ``due_ns``."""
         self._delayed = command, self._scheduler.at(due_ns, self._command_key, self._carry_out)
 
     def _carry_out(self, now_ns: int) -> None:
-        """Execute the delayed command."""
         delayed, self._delayed = self._delayed, None
         if delayed is not None:
             self._controller.command(delayed[0], self._interrupts.at_ns, now_ns)
 
     def _forget_accesses(self) -> None:
-        """Cancel the delayed command and count accesses from 0."""
         delayed, self._delayed, self._accesses = self._delayed, None, 0
         if delayed is not None:
             delayed[1].cancel()
 
     def _delayed_state(self) -> list[Any] | None:
-        """Return when a delayed command takes effect, and the command; None without one."""
         if self._delayed is None:
             return None
         command, event = self._delayed
@@ -422,14 +404,14 @@ class DriveControllerModule:
     def _rest_from(self, first_ns: int) -> None:
         if self._plant is not None:
             self._end_rest()
-            self._rest = self._scheduler.at(first_ns, self._rest_key, self._look)
+            self._rest = self._scheduler.at(first_ns, self._rest_key, self._update)
 
     def _end_rest(self) -> None:
         if self._rest is not None:
             self._rest.cancel()
             self._rest = None
 
-    def _look(self, now_ns: int) -> None:
+    def _update(self, now_ns: int) -> None:
         """Advance the plant while it is not driven; no update is left out if the host is late."""
         self._rest_from(now_ns + REST_NS)
         plant = self._plant

@@ -27,8 +27,6 @@ GAINS = {230: 0.02, 380: 0.0121, 460: 0.01, 550: 0.00835, 660: 0.00696}
 """Volts at the 57C405 per volt of the armature, by the nominal line voltage of the transformer, V rms (52.6.1)."""
 FULL_SCALE_V, FULL_SCALE_COUNTS = 10.0, 4095
 """Full scale of the input, V and counts (decision: as a 57C409)."""
-
-
 _OWN = 3 << FMCR_BIT | 1 << DRIVE_OK_BIT
 
 
@@ -47,16 +45,15 @@ def voltage_counts(volts: float, line_v: float) -> int:
 class DriveAnalogModule(IoModule):
     """A 57C405."""
 
-    def feel(self, volts: float, line_v: float) -> None:
+    def show_voltage(self, volts: float, line_v: float) -> None:
         """Show an armature voltage, V, through the transformer for a line's nominal voltage, V."""
-        self._show(0, voltage_counts(volts, line_v))
+        self._own.show(0, voltage_counts(volts, line_v))
 
 
 class DriveDigital:
-    """Reads the drive's inputs and sets its outputs. A slot without such registers reads 0 and ignores outputs.
+    """Reads the drive's inputs and sets its outputs, in ``slot``, None until a task names it.
 
-    Attributes:
-        slot: where the module is, None until a task names it.
+    A slot without such registers reads 0 and ignores outputs.
     """
 
     def __init__(self, memory: CommonMemory, backplane: Backplane, scheduler: Scheduler, writer: int) -> None:

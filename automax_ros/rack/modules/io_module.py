@@ -14,13 +14,36 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
 from automax_ros.core.ticks import CLOCK_PERIOD_NS
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.modules.module import ModuleState, RackServices
+from automax_ros.rack.modules.module import ModuleState
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
+from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.module import Interrupt, ModuleConfig
 from automax_ros.runtime.memory.process_inputs import Freezer
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
 
 _COUNTER_BITS = 24
+
+
+class OwnRegisters:
+    """The registers of a module as it reads and writes them itself; ``view`` is that of its bank."""
+
+    def __init__(self, config: ModuleConfig, parts: RackServices) -> None:
+        """Find the registers of a module."""
+        bank = parts.backplane.bank(config.slot)
+        assert bank is not None
+        self.view = bank.view
+        self._name, self._parts, self._memory = config.name, parts, parts.memory
+
+    def read(self, register: int) -> int:
+        """Return a register."""
+        return int(self._memory.read_now(self.view, register))
+
+    def show(self, register: int, value: Value) -> None:
+        """Write a register if its value changes."""
+        memory = self._memory
+        if memory.read_now(self.view, register) != value:
+            memory.now_ns = self._parts.scheduler.now_ns
+            memory.write_now(self.view, value, self._parts.writer(self._name), register, WriteKind.OUTSIDE)
 
 
 class IoModule:
@@ -30,18 +53,19 @@ class IoModule:
 
     def __init__(self, config: ModuleConfig, parts: RackServices) -> None:
         """Create a module from its configuration; it does nothing until the clock is turned on."""
-        bank = parts.backplane.bank(config.slot)
-        assert bank is not None
-        self.config, self._parts, self._view = config, parts, bank.view
+        self.config, self._parts, self._own = config, parts, OwnRegisters(config, parts)
+        self._view = view = self._own.view
         registers = config.registers
         inputs = (number for number in range(registers.count) if registers.direction(number) == "input")
-        self.kept = parts.memory.registers.showing(bank.view, inputs)
-        self._interrupts = [_PeriodicInterrupt(config.slot, bank.view, item, parts) for item in registers.interrupts]
-        self._looks = False
+        self.kept = parts.memory.registers.showing(view, inputs)
+        self._interrupts = [_PeriodicInterrupt(config.slot, view, item, parts) for item in registers.interrupts]
+        self._posted = False
         if self._interrupts:
             self._watch()
         for first in registers.counters:
-            parts.inputs.shape(self._doubles(first), _counted)
+            shown = sorted(parts.memory.registers.showing(view, [first]))
+            doubles = [key for key in shown if parts.memory.specs[key[0]].type is DataType.DOUBLE]
+            parts.inputs.shape(doubles, _counted)
 
     def power_on(self) -> None:
         """Start nothing: no register drives the clock yet."""
@@ -56,7 +80,7 @@ class IoModule:
             interrupt.free()
 
     def state(self) -> ModuleState:
-        """Return when its interrupts come, and what is frozen: ``{}`` for a module without interrupts."""
+        """Return when its interrupts come, and what is frozen: ``{}`` without interrupts."""
         return {str(item.status): item.state() for item in self._interrupts}
 
     def load(self, state: ModuleState) -> None:
@@ -70,55 +94,41 @@ class IoModule:
         for item in self._interrupts:
             item.load(state[str(item.status)])
         if self._interrupts:
-            self._look_soon()
+            self._check_soon()
 
     def _watch(self) -> None:
         parts, registers = self._parts, self.config.registers
-        looked_at = {source for source, _ in registers.copies}
+        watched = {source for source, _ in registers.copies}
         for item in registers.interrupts:
-            looked_at.update(number for number in (item.status, item.period) if number is not None)
+            watched.update(number for number in (item.status, item.period) if number is not None)
             parts.clock.add_enable(self.config.name, self._view, item.status)
-        for register in sorted(looked_at):
-            parts.memory.watch(self._view, register, self._look_soon)
-        parts.clock.watch(self._look)
+        for register in sorted(watched):
+            parts.memory.watch(self._view, register, self._check_soon)
+        parts.clock.watch(self._check)
         parts.interrupts.watch(self._task_installed)
-
-    def _doubles(self, first: int) -> list[tuple[int, int]]:
-        """Return the DOUBLE INTEGERs at a register."""
-        memory = self._parts.memory
-        shown = memory.registers.showing(self._view, [first])
-        return [key for key in sorted(shown) if memory.specs[key[0]].type is DataType.DOUBLE]
 
     def _task_installed(self) -> None:
         if self._parts.clock.runs:
-            self._look_soon()
+            self._check_soon()
 
-    def _look_soon(self) -> None:
+    def _check_soon(self) -> None:
         """Check the registers when the write that changed one is complete, still at this instant."""
-        if not self._looks:
-            self._looks = True
+        if not self._posted:
+            self._posted = True
             scheduler, key = self._parts.scheduler, EventKey(EventClass.IO, self.config.slot, "")
-            scheduler.at(scheduler.now_ns, key, lambda _: self._look())
+            scheduler.at(scheduler.now_ns, key, lambda _: self._check())
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         """Start or end interrupts as the clock and the registers require."""
-        self._looks = False
+        self._posted = False
         for interrupt in self._interrupts:
-            interrupt.look()
-        read, registers = self._parts.memory.read_now, self.config.registers
+            interrupt.schedule()
+        own, registers = self._own, self.config.registers
         for source, copy in registers.copies:
-            self._show(copy, read(self._view, source))
+            own.show(copy, own.read(source))
         for register, bits in registers.clock_status:
-            self._show(register, bits if self._parts.clock.runs else 0)
+            own.show(register, bits if self._parts.clock.runs else 0)
         self._parts.tell_writes()
-
-    def _show(self, register: int, value: Value) -> None:
-        """Write an input that the module itself sets."""
-        memory = self._parts.memory
-        if memory.read_now(self._view, register) != value:
-            memory.now_ns = self._parts.scheduler.now_ns
-            writer = self._parts.writer(self.config.name)
-            memory.write_now(self._view, value, writer, register, WriteKind.OUTSIDE)
 
 
 class _PeriodicInterrupt:
@@ -132,8 +142,7 @@ class _PeriodicInterrupt:
         self._freezer = Freezer(parts.memory.registers.showing(bank, interrupt.inputs))
         self._event: ScheduledEvent | None = None
 
-    def look(self) -> None:
-        """Schedule the next interrupt by the clock and the registers."""
+    def schedule(self) -> None:
         since, period = self._parts.clock.since_ns, self._period_ns
         if since is None or not self._is_enabled:
             self._cancel()
@@ -142,17 +151,13 @@ class _PeriodicInterrupt:
             self._begin(since + (passed + 1) * period)
 
     def free(self) -> None:
-        """Unfreeze its inputs."""
         if self._parts.inputs.free(self._freezer):
             self._parts.tell_writes()
 
     def state(self) -> dict[str, object]:
-        """Return when it comes next (ns), and what is frozen."""
-        due = self._parts.scheduler.due_ns(self._event) if self._event is not None else None
-        return {"next_ns": due, **self._freezer.state()}
+        return {"next_ns": self._parts.scheduler.due_ns(self._event), **self._freezer.state()}
 
     def load(self, state: ModuleState) -> None:
-        """Restore a state, with the registers of that time."""
         self._cancel()
         if state["next_ns"] is not None:
             self._begin(state["next_ns"])

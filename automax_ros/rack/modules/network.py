@@ -19,15 +19,14 @@ Counters are shown at every sixteenth cycle (decision: each showing is an entry 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import partial
 
-from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
-from automax_ros.rack.modules.module import ModuleState, RackServices
-from automax_ros.rack.modules.network_drops import DropMessage, Hearing, NetworkStatus, Send, Sender
-from automax_ros.rack.tasks.scheduled_task import ScheduledTask
-from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rack.modules.io_module import OwnRegisters
+from automax_ros.rack.modules.module import ModuleState, QuietModule
+from automax_ros.rack.modules.network_drops import DropMessage, NetworkStatus, Reception, Send, Sender
+from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.modules.network import (
     AREA,
     BROADCAST,
@@ -44,6 +43,7 @@ from automax_ros.rackfile.modules.network import (
     TIMEOUTS,
     TRANSMITTED,
     VALID,
+    NetworkConfig,
     from_master,
     from_slave,
     greatest_depth,
@@ -66,32 +66,30 @@ _COUNTERS = {
 _WORD = 0xFFFF
 
 
-class NetworkModule:
-    """A 57C404."""
+class NetworkModule(QuietModule):
+    """A 57C404 on a ``network``; STOP ALL clears its outputs, which the others then receive."""
 
-    tasks: Sequence[ScheduledTask] = ()
-
-    def __init__(self, config: ModuleConfig, network: str, drop: int, parts: RackServices) -> None:
+    def __init__(self, config: NetworkConfig, parts: RackServices) -> None:
         """Create a module from its configuration; it does nothing until power-up."""
-        bank = parts.backplane.bank(config.slot)
-        assert bank is not None
-        self.config, self.network = config, network
-        self._drop, self._parts, self._view = drop, parts, bank.view
-        registers = config.registers
+        super().__init__(config)
+        self.network, self._drop, self._parts = config.network, config.drop, parts
+        self._own = OwnRegisters(config, parts)
+        registers, memory, view = config.registers, parts.memory, self._own.view
         inputs = [number for number in range(registers.count) if registers.direction(number) == "input"]
-        self.kept = parts.memory.registers.showing(bank.view, [*inputs, DEPTH])
-        self._named = self._named_drops()
-        self._hearing = Hearing(self._named if self._is_master else (MASTER,))
+        self.kept = memory.registers.showing(view, [*inputs, DEPTH])
+        places = (spec.place for spec in memory.specs)
+        drops = {place.register // AREA for place in places if place is not None and place.bank == view}
+        self._named = sorted(drops - {MASTER})  # those in whose areas the rack file has variables
+        self._reception = Reception(self._named if self._is_master else (MASTER,))
         self._key = EventKey(EventClass.IO, config.slot, "network")
         self._event: ScheduledEvent | None = None
         self._written: set[int] = set()
-        if self._is_master:
-            self._watch_writes()
+        for drop in range(1, LAST_DROP + 1) if self._is_master else ():
+            for number in from_master(drop) if drop not in self._named else ():
+                memory.watch(view, number, partial(self._written.add, drop))
         self._send: Send | None = None
         self._sequence = 0
         self._forget()
-
-    # Station
 
     def connect(self, send: Send) -> None:
         """Set the function that transmits its frames from now on."""
@@ -102,7 +100,6 @@ class NetworkModule:
         if self._event is None:
             return
         self._count["unreadable"] += damaged
-        self._parts.memory.now_ns = self._parts.scheduler.now_ns
         for sender, frame in frames:
             if frame.is_sound:
                 self._take(sender, frame)
@@ -112,25 +109,21 @@ class NetworkModule:
 
     def status(self) -> NetworkStatus:
         """Return its status on the network."""
-        hearing = self._hearing
-        powered = self._event is not None
+        reception = self._reception
         return NetworkStatus(
             self._drop,
             self._depth,
             self._defined,
-            hearing.heard,
-            hearing.lost,
-            tuple(sorted(hearing.rivals)),
-            LOST_CODE if powered and hearing.lost else "",
+            reception.received,
+            reception.lost,
+            tuple(sorted(reception.rivals)),
+            LOST_CODE if self._event is not None and reception.lost else "",
             tuple((name, count & _WORD) for name, count in self._count.items()),
         )
-
-    # Module
 
     def power_on(self) -> None:
         """Show its drop, and start its cycles."""
         self._forget()
-        self._parts.memory.now_ns = self._parts.scheduler.now_ns
         self._write(OWN_DROP, self._drop | VALID)
         self._begin(self._parts.scheduler.now_ns + CYCLE_NS)
 
@@ -139,24 +132,20 @@ class NetworkModule:
         if self._event is not None:
             self._event.cancel()
             self._event = None
-        self._parts.memory.now_ns = self._parts.scheduler.now_ns
         for number in range(self.config.registers.count):
             self._write(number, 0)
-
-    def stopped_all(self) -> None:
-        """Continue: its outputs are 0 now, and the others see that."""
 
     def state(self) -> ModuleState:
         """Return when the next cycle comes (ns), its counters, and from which senders it receives."""
         return {
-            "next_ns": self._parts.scheduler.due_ns(self._event) if self._event is not None else None,
+            "next_ns": self._parts.scheduler.due_ns(self._event),
             "depth": self._depth,
             "defined": self._defined,
             "sequence": self._sequence,
             "written": sorted(self._written),
             "bits": list(self._bits),
             "count": dict(self._count),
-            **self._hearing.state(),
+            **self._reception.state(),
         }
 
     def load(self, state: ModuleState) -> None:
@@ -170,7 +159,7 @@ class NetworkModule:
         self._depth, self._defined, self._sequence = state["depth"], state["defined"], state["sequence"]
         self._bits, self._count = list(state["bits"]), dict(state["count"])
         self._written.update(state["written"])
-        self._hearing.load(state["drops"], state["rivals"])
+        self._reception.load(state["drops"], state["rivals"])
         if state["next_ns"] is not None:
             self._begin(state["next_ns"])
 
@@ -179,40 +168,30 @@ class NetworkModule:
         return self._drop == MASTER
 
     @property
-    def _own(self) -> range:
+    def _drops(self) -> range:
         return range(self._drop, self._drop + self._depth)
-
-    def _named_drops(self) -> list[int]:
-        """Return the drops in whose areas the rack file has variables."""
-        places = (spec.place for spec in self._parts.memory.specs)
-        drops = {place.register // AREA for place in places if place is not None and place.bank == self._view}
-        return sorted(drops - {MASTER})
-
-    def _watch_writes(self) -> None:
-        """Record to which drops without variables a task writes."""
-        for drop in range(1, LAST_DROP + 1):
-            for number in from_master(drop) if drop not in self._named else ():
-                self._parts.memory.watch(self._view, number, partial(self._written.add, drop))
 
     def _forget(self) -> None:
         self._depth, self._defined = 1, False
         self._written.clear()
         self._bits = [0] * len(STATUS)
         self._count = dict.fromkeys(_COUNTERS, 0)
-        self._hearing.clear()
+        self._reception.clear()
 
     def _begin(self, first_ns: int) -> None:
         self._event = self._parts.scheduler.every(CYCLE_NS, first_ns, self._key, self._cycle)
 
     def _cycle(self, now_ns: int, _: int) -> None:
-        self._parts.memory.now_ns = now_ns
         self._sequence += 1
-        self._count["timeouts"] += self._hearing.cycle()
+        self._count["timeouts"] += self._reception.cycle()
         if not self._is_master:
             self._process_depth()
         self._show_drops()
-        if self._is_master or self._hearing.drops[MASTER].is_heard:
-            self._transmit(now_ns)
+        if self._is_master or self._reception.drops[MASTER].is_received:
+            frames = [self._frame(drop) for drop in self._sent()]
+            self._count["transmitted"] += len(frames)
+            if self._send is not None:
+                self._send(now_ns, frames)
         if self._sequence % SHOW_EVERY == 0:
             for name, number in _COUNTERS.items():
                 self._write(number, self._count[name])
@@ -231,34 +210,27 @@ class NetworkModule:
             self._write(DEPTH, value | DONE | INVALID)
 
     def _show_drops(self) -> None:
-        """Show which drops communicate, where that changed: stimuli may have written something else."""
-        for index, bits in enumerate(self._communicating()):
+        """Show which drops communicate, where that changed: stimuli may have written something else.
+
+        The master shows drops whose depth is defined, a slave 0 and its own (p. 18-6).
+        """
+        reception = self._reception
+        if self._is_master:
+            drops = [drop for drop in reception.received if reception.drops[drop].defined]
+        else:
+            drops = [MASTER, *self._drops] if self._defined and reception.received else []
+        words = [0] * len(STATUS)
+        for drop in drops:
+            words[drop // 16] |= 1 << drop % 16
+        for index, bits in enumerate(words):
             if self._bits[index] != bits:
                 self._bits[index] = bits
                 self._write(STATUS[index], bits)
 
-    def _communicating(self) -> list[int]:
-        """Return the status bits: the master shows drops whose depth is defined, a slave 0 and its own (p. 18-6)."""
-        hearing = self._hearing
-        if self._is_master:
-            drops = [drop for drop in hearing.heard if hearing.drops[drop].defined]
-        else:
-            drops = [MASTER, *self._own] if self._defined and hearing.heard else []
-        words = [0] * len(STATUS)
-        for drop in drops:
-            words[drop // 16] |= 1 << drop % 16
-        return words
-
-    def _transmit(self, now_ns: int) -> None:
-        frames = [self._frame(drop) for drop in self._sent()]
-        self._count["transmitted"] += len(frames)
-        if self._send is not None:
-            self._send(now_ns, frames)
-
     def _sent(self) -> Iterable[int]:
         """Return the drops of which it sends a half in each cycle."""
         if not self._is_master:
-            return self._own
+            return self._drops
         return [MASTER, *sorted({*self._named, *self._written})]
 
     def _frame(self, drop: int) -> DropMessage:
@@ -270,35 +242,26 @@ class NetworkModule:
         """Process a valid frame: from the other side, or from a rival that uses drops of this module."""
         from_the_master = frame.station == MASTER
         if self._is_master == from_the_master:
-            if from_the_master or not set(self._own).isdisjoint(frame.drops):
-                self._hearing.meet(sender)
-            return
-        if from_the_master and frame.drop != MASTER and frame.drop not in self._own:
+            if from_the_master or not set(self._drops).isdisjoint(frame.drops):
+                self._reception.add_rival(sender)
             return
         if from_the_master and frame.drop != MASTER:
-            self._accept(frame, from_master(frame.drop), self._follows_master(sender))
-        elif from_the_master:
-            self._accept(frame, BROADCAST, self._hearing.take(sender, frame))
-        else:
-            self._accept(frame, from_slave(frame.drop), self._hearing.take(sender, frame))
-
-    def _follows_master(self, sender: Sender) -> int | None:
-        """Return 0 if the present master sent it: only its broadcast frame shows missed cycles."""
-        return 0 if self._hearing.drops[MASTER].is_heard and self._hearing.drops[MASTER].sender == sender else None
-
-    def _accept(self, frame: DropMessage, registers: range, missed: int | None) -> None:
-        if missed is None:
+            master = self._reception.drops[MASTER]  # only its broadcast frame shows missed cycles
+            if frame.drop in self._drops and master.is_received and master.sender == sender:
+                self._accept(frame, from_master(frame.drop), 0)
             return
+        missed = self._reception.take(sender, frame)
+        if missed is not None:
+            self._accept(frame, BROADCAST if from_the_master else from_slave(frame.drop), missed)
+
+    def _accept(self, frame: DropMessage, registers: range, missed: int) -> None:
         self._count["received"] += 1
         self._count["missed"] += missed
         for number, word in zip(registers, frame.words, strict=False):
             self._write(number, word)
 
     def _read(self, number: int) -> int:
-        return int(self._parts.memory.read_now(self._view, number)) & _WORD
+        return self._own.read(number) & _WORD
 
     def _write(self, number: int, word: int) -> None:
-        """Write a register if its value changes."""
-        if self._read(number) != word & _WORD:
-            value, writer = sign_extended(word & _WORD, 16), self._parts.writer(self.config.name)
-            self._parts.memory.write_now(self._view, value, writer, number, WriteKind.OUTSIDE)
+        self._own.show(number, sign_extended(word & _WORD, 16))

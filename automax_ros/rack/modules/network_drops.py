@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from automax_ros.rackfile.modules.network import HALF, LAST_DROP, MASTER, greatest_depth
 
@@ -92,28 +92,6 @@ class NetworkStatus:
     counters: tuple[tuple[str, int], ...]
 
 
-@runtime_checkable
-class Station(Protocol):
-    """A module with a place on a network."""
-
-    @property
-    def network(self) -> str:
-        """The network's name."""
-        ...
-
-    def connect(self, send: Send) -> None:
-        """Set the function that transmits its frames from now on."""
-        ...
-
-    def receive(self, frames: Iterable[tuple[Sender, DropMessage]], damaged: int = 0) -> None:
-        """Process received frames, between two scans, and count those that could not be read."""
-        ...
-
-    def status(self) -> NetworkStatus:
-        """Return its status on the network."""
-        ...
-
-
 @dataclass
 class Drop:
     """A drop that is awaited: its sender, None before its first frame, and its silence (cycles)."""
@@ -129,12 +107,12 @@ class Drop:
         return self.silent >= TIMEOUT_CYCLES * MISSES
 
     @property
-    def is_heard(self) -> bool:
+    def is_received(self) -> bool:
         """Whether its frames arrive."""
         return self.sender is not None and not self.is_lost
 
 
-class Hearing:
+class Reception:
     """The drops that a module waits for; ``rivals`` are senders that use another's, with their silence (cycles)."""
 
     def __init__(self, awaited: Iterable[int] = ()) -> None:
@@ -152,16 +130,16 @@ class Hearing:
     def take(self, sender: Sender, frame: DropMessage) -> int | None:
         """Record the sender of a frame; return how many frames of the drop were missed, None for a rival's."""
         known = self.drops.setdefault(frame.drop, Drop())
-        if known.is_heard and known.sender != sender:
-            self.meet(sender)
+        if known.is_received and known.sender != sender:
+            self.add_rival(sender)
             return None
-        missed = (frame.sequence - known.sequence - 1) % _WRAP if known.is_heard else 0
+        missed = (frame.sequence - known.sequence - 1) % _WRAP if known.is_received else 0
         if missed >= _WRAP // 2:  # an older one, overtaken by another
             return None
         known.sender, known.sequence, known.defined, known.silent = sender, frame.sequence, frame.defined, 0
         return missed
 
-    def meet(self, rival: Sender) -> None:
+    def add_rival(self, rival: Sender) -> None:
         """Record a sender that uses another's drop."""
         if rival in self.rivals or len(self.rivals) < MOST_RIVALS:
             self.rivals[rival] = 0
@@ -178,9 +156,9 @@ class Hearing:
         return timeouts
 
     @property
-    def heard(self) -> tuple[int, ...]:
+    def received(self) -> tuple[int, ...]:
         """The drops whose frames arrive."""
-        return tuple(sorted(drop for drop, item in self.drops.items() if item.is_heard))
+        return tuple(sorted(drop for drop, item in self.drops.items() if item.is_received))
 
     @property
     def lost(self) -> tuple[int, ...]:

@@ -15,13 +15,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType
 from automax_ros.language.program import Program, lines_that_write
 from automax_ros.language.tree.tree import Scope
-from automax_ros.rack.modules.module import ModuleState, RackServices
+from automax_ros.rack.modules.io_module import OwnRegisters
+from automax_ros.rack.modules.module import ModuleState
 from automax_ros.rack.modules.udc_pmi import UdcPmis
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
+from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rack.tasks.triggers import Due
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.udc import (
@@ -35,7 +36,6 @@ from automax_ros.rackfile.modules.udc import (
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.private_image import LocalMemory
 from automax_ros.runtime.memory.registers import RegisterMap
-from automax_ros.runtime.memory.views import ViewSpec
 from automax_ros.runtime.tasks.task import Status, Task
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
 
@@ -51,16 +51,8 @@ class Copied:
     outputs: dict[str, tuple[Key, ...]]
 
 
-@dataclass(frozen=True)
-class Copies:
-    """The copies of one UDC: at every scan, and at every Nth."""
-
-    every: Copied
-    nth: Copied
-
-
-def copies_of(programs: Sequence[Program], bank: int, memory: CommonMemory) -> Copies:
-    """Return the copies of a UDC with these tasks, in their order; ``bank`` is the view of its registers."""
+def copies_of(programs: Sequence[Program], bank: int, memory: CommonMemory) -> tuple[Copied, Copied]:
+    """Return the copies of a UDC with these tasks at every scan and at every Nth; ``bank`` is its registers' view."""
     written: dict[int, str] = {}
     used: set[int] = set()
     for program in programs:
@@ -71,7 +63,7 @@ def copies_of(programs: Sequence[Program], bank: int, memory: CommonMemory) -> C
             written.update(dict.fromkeys(_sent_with(name, bank, memory), program.name))
     every = {register for register in (*used, *written) if register in EVERY_SCAN}
     nth = {register for register in (*used, *written) if register not in EVERY_SCAN}
-    return Copies(_copied(every, written, bank, memory.registers), _copied(nth, written, bank, memory.registers))
+    return _copied(every, written, bank, memory.registers), _copied(nth, written, bank, memory.registers)
 
 
 def application_registers(name: str, bank: int, memory: CommonMemory) -> range:
@@ -79,19 +71,15 @@ def application_registers(name: str, bank: int, memory: CommonMemory) -> range:
     spec = memory.specs[memory.view(name)]
     if spec.place is None or spec.place.bank != bank or spec.place.register not in APPLICATION:
         return range(0)
-    return range(spec.place.register, spec.place.register + _width(spec))
+    width = 2 if spec.type in (DataType.DOUBLE, DataType.REAL) else 1
+    return range(spec.place.register, spec.place.register + width)
 
 
 def _sent_with(name: str, bank: int, memory: CommonMemory) -> range:
-    """Return the registers that are copied out with a common."""
     own = application_registers(name, bank, memory)
     if own and memory.specs[memory.view(name)].type is DataType.BOOLEAN:
         return range(own[0] & ~1, (own[0] & ~1) + 2)
     return own
-
-
-def _width(spec: ViewSpec) -> int:
-    return 2 if spec.type in (DataType.DOUBLE, DataType.REAL) else 1
 
 
 def _copied(registers: Iterable[int], written: dict[int, str], bank: int, views: RegisterMap) -> Copied:
@@ -135,14 +123,13 @@ class UdcModule:
 
     def __init__(self, config: ModuleConfig, parts: RackServices) -> None:
         """Install the tasks; the module does nothing until the common clock runs."""
-        bank = parts.backplane.bank(config.slot)
-        assert bank is not None
-        self.config, self._parts, self._bank = config, parts, bank.view
+        self.config, self._parts, self._own = config, parts, OwnRegisters(config, parts)
+        self._bank = bank = self._own.view
         views = parts.memory.registers
-        self.kept = views.showing(bank.view, RETAINED)
-        self._local = tuple(sorted(views.showing(bank.view, APPLICATION)))
-        self._memory = LocalMemory(parts.memory, {view for view, _ in self._local if view != bank.view})
-        self._copies: Copies | None = None
+        self.kept = views.showing(bank, RETAINED)
+        self._local = tuple(sorted(views.showing(bank, APPLICATION)))
+        self._memory = LocalMemory(parts.memory, {view for view, _ in self._local if view != bank})
+        self._copies: tuple[Copied, Copied] | None = None
         self._count = self._missed = 0
         self._rest: list[ScheduledTask] = []
         self._current: ScheduledTask | None = None
@@ -156,8 +143,8 @@ class UdcModule:
             parts.install(item, execution, memory=self._memory, trigger=self._trigger, then=self._has_run)
             for item in config.tasks
         ]
-        self._pmis = UdcPmis(config, parts, bank.view, self._commands)
-        parts.clock.add_enable(config.name, bank.view, ISCR)
+        self._pmis = UdcPmis(config, parts, self._own, self._commands)
+        parts.clock.add_enable(config.name, bank, ISCR)
         parts.clock.watch(self.follow)
 
     @property
@@ -168,7 +155,7 @@ class UdcModule:
     @property
     def scan_ns(self) -> int | None:
         """When the next scan of the module is due; None without the common clock or a task in RUN."""
-        return None if self._event is None else self._parts.scheduler.due_ns(self._event)
+        return self._parts.scheduler.due_ns(self._event)
 
     def power_on(self) -> None:
         """Start the PMIs, which follow their lines; the common clock is off, so no scan starts."""
@@ -182,7 +169,7 @@ class UdcModule:
 
     def stopped_all(self) -> None:
         """Clear what a UDC loses at STOP ALL: the locals of its tasks and its local memory (2.4.5)."""
-        self._break_off()
+        self._rest, self._current, self._scanning = [], None, False
         self._count = self._missed = 0
         self._memory.image.clear(self._local)
         for item in self.tasks:
@@ -261,17 +248,13 @@ class UdcModule:
 
     def _scan_from(self, first_ns: int) -> None:
         self._cancel()
-        running = self._taking_part()
-        period_ns = running[0].task.period_ns
+        period_ns = self._taking_part()[0].task.period_ns
         self._event = self._parts.scheduler.every(period_ns, first_ns, self._key, self._scan)
 
     def _cancel(self) -> None:
         if self._event is not None:
             self._event.cancel()
             self._event = None
-
-    def _break_off(self) -> None:
-        self._rest, self._current, self._scanning = [], None, False
 
     def _scan(self, now_ns: int, skipped: int) -> None:
         """Start a scan of the module; if the last one is still in progress, its task has overlapped (code 14)."""
@@ -298,11 +281,13 @@ class UdcModule:
         present = before + skipped + 1
         self._count = present % every if every else 0
         self._missed = present // every - (before + 1) // every if every else 0
-        self._show_count()
-        image, copies = self._memory.image, self._present_copies
-        image.take(copies.every.inputs)
+        if self._own.read(SCAN_COUNTER) != self._count:
+            self._own.show(SCAN_COUNTER, self._count)
+            self._parts.tell_writes()
+        image, (at_every, at_nth) = self._memory.image, self._present_copies
+        image.take(at_every.inputs)
         if every and present // every > before // every:
-            image.take(copies.nth.inputs)
+            image.take(at_nth.inputs)
         if self._parts.memory.forced:
             image.take_forced()
 
@@ -324,7 +309,7 @@ class UdcModule:
             return
         self._current = None
         now_ns = self.now_ns
-        self._copy_out(self._present_copies.every, task.name, now_ns)
+        self._copy_out(self._present_copies[0], task.name, now_ns)
         self._go_on(now_ns)
 
     def _end(self, now_ns: int) -> None:
@@ -333,8 +318,9 @@ class UdcModule:
         due = self._missed + (self._count == every - 1)
         if not every or not due:
             return
-        for name in self._present_copies.nth.outputs:
-            self._copy_out(self._present_copies.nth, name, now_ns)
+        _, at_nth = self._present_copies
+        for name in at_nth.outputs:
+            self._copy_out(at_nth, name, now_ns)
         self._parts.interrupts.post(self._bank, ISCR, now_ns, skipped=due - 1)
 
     def _copy_out(self, copied: Copied, name: str, now_ns: int) -> None:
@@ -345,21 +331,13 @@ class UdcModule:
             self._memory.image.give(keys, writer)
             self._parts.tell_writes()
 
-    def _show_count(self) -> None:
-        """Show the scans since the last Nth one in the counter's register."""
-        memory = self._parts.memory
-        if memory.read_now(self._bank, SCAN_COUNTER) != self._count:
-            writer = self._parts.writer(self.config.name)
-            memory.write_now(self._bank, self._count, writer, SCAN_COUNTER, WriteKind.OUTSIDE)
-            self._parts.tell_writes()
-
     @property
     def _scans_per_interrupt(self) -> int:
         """Register 2001; 0 or less means no interrupt and no copy of the registers of the Nth scan (decision)."""
-        return max(0, int(self._parts.memory.read_now(self._bank, SCANS_PER_INTERRUPT)))
+        return max(0, self._own.read(SCANS_PER_INTERRUPT))
 
     @property
-    def _present_copies(self) -> Copies:
+    def _present_copies(self) -> tuple[Copied, Copied]:
         if self._copies is None:
             programs = [item.task.compiled.program for item in self.tasks]
             self._copies = copies_of(programs, self._bank, self._parts.memory)

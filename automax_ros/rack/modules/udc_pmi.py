@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from automax_ros.core.kinds import WriteKind
 from automax_ros.drive.base.errors import DriveError
 from automax_ros.drive.pmi import registers as table
 from automax_ros.drive.pmi.pmi import Commands, Pmi
-from automax_ros.rack.modules.module import ModuleState, RackServices
+from automax_ros.rack.modules.io_module import OwnRegisters
+from automax_ros.rack.modules.module import ModuleState
+from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.driven import Driving
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.udc import RAIL_COUNTERS
@@ -24,12 +25,15 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEv
 class UdcPmis:
     """The PMIs of one UDC: one for each drive that has a plant with a motor."""
 
-    def __init__(self, config: ModuleConfig, parts: RackServices, bank: int, commanded: Callable[[str], bool]) -> None:
+    def __init__(
+        self, config: ModuleConfig, parts: RackServices, own: OwnRegisters, commanded: Callable[[str], bool]
+    ) -> None:
         """Connect the PMIs; ``commanded`` returns whether a task that commands a drive scans."""
         plants = config.plants if isinstance(config, Driving) else {}
-        self._name, self._parts, self._bank, self._commanded = config.name, parts, bank, commanded
+        self._name, self._parts, self._commanded = config.name, parts, commanded
+        self.read, self.show, self.post = own.read, own.show, parts.scheduler.at
         self._key = EventKey(EventClass.IO, config.slot, "link")
-        self._looks = False
+        self._posted = False
         self._links = [
             _Link(self, drive, Pmi(parts.plants[plant.name], plant.motor_overload_ratio), config.slot)
             for drive, plant in sorted(plants.items())
@@ -52,9 +56,9 @@ class UdcPmis:
 
     def follow(self) -> None:
         """Check the common clock when the present change is complete, still at this instant."""
-        if self._links and not self._looks:
-            self._looks = True
-            self._parts.scheduler.at(self._parts.scheduler.now_ns, self._key, self._look)
+        if self._links and not self._posted:
+            self._posted = True
+            self.post(self._parts.scheduler.now_ns, self._key, self._check)
 
     def state(self) -> dict[str, object]:
         """Return the state of each PMI by its drive."""
@@ -64,7 +68,7 @@ class UdcPmis:
         """Restore a state.
 
         Raises:
-            ValueError: it is that of other drives.
+            ValueError: it is that of other drives, or not one of PMIs.
         """
         if set(state) != {link.drive for link in self._links}:
             raise ValueError(f"{self._name} has PMIs for other drives")
@@ -85,24 +89,9 @@ class UdcPmis:
             self._commanded(link.drive),
         )
 
-    def read(self, register: int) -> int:
-        """Return a register."""
-        return int(self._parts.memory.read_now(self._bank, register))
-
-    def show(self, register: int, value: int) -> None:
-        """Write a register if its value changes."""
-        memory = self._parts.memory
-        if memory.read_now(self._bank, register) != value:
-            memory.now_ns = self._parts.scheduler.now_ns
-            memory.write_now(self._bank, value, self._parts.writer(self._name), register, WriteKind.OUTSIDE)
-
-    def post(self, at_ns: int, key: EventKey, action: Callable[[int], None]) -> ScheduledEvent:
-        """Post an event."""
-        return self._parts.scheduler.at(at_ns, key, action)
-
-    def _look(self, _: int) -> None:
+    def _check(self, _: int) -> None:
         """Show that the clock does not run while tasks do."""
-        self._looks = False
+        self._posted = False
         if self._parts.clock.runs:
             return
         for link in self._links:
@@ -127,7 +116,6 @@ class _Link:
         self.event = self._udc.post(at_ns, self._key, self._scan)
 
     def receive(self, now_ns: int) -> None:
-        """Write the PMI's message of an instant into the registers."""
         udc = self._udc
         if udc.read(self.base + table.CONTROL) & table.COUNTER_RESET:
             for register in RAIL_COUNTERS[self.drive]:
@@ -139,16 +127,10 @@ class _Link:
         udc.show(self.base + table.LINK, 0)
 
     def state(self) -> dict[str, object]:
-        """Return the PMI's state, and when it scans next (ns)."""
         next_ns = None if self.event is None else self._next_ns
         return {"pmi": self._pmi.state(), "next_ns": next_ns}
 
     def load(self, state: ModuleState) -> None:
-        """Restore a state.
-
-        Raises:
-            ValueError: it is not that of a PMI.
-        """
         try:
             self._pmi.restore(state["pmi"])
         except DriveError as error:

@@ -62,7 +62,7 @@ class WaitTrigger:
         """When the next burst is due; now, while that is not known."""
         if self._due is None:
             return None
-        due_ns = self._scheduler.due_ns(self._event) if self._event is not None else None
+        due_ns = self._scheduler.due_ns(self._event)
         return self._scheduler.now_ns if due_ns is None else due_ns
 
     def _suspended(self) -> None:

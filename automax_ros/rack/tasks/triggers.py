@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from automax_ros.core.ticks import UDC_TICK_NS
-from automax_ros.runtime.scan.events import Event, Events
+from automax_ros.runtime.scan.events import Event
 from automax_ros.runtime.tasks.cml_task import CmlTask
 from automax_ros.runtime.tasks.task import Task
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
@@ -65,7 +65,7 @@ class ClockTrigger:
     @property
     def next_ns(self) -> int | None:
         """When the next scan is due."""
-        return self._scheduler.due_ns(self._event) if self._event is not None else None
+        return self._scheduler.due_ns(self._event)
 
 
 class Timeout:
@@ -178,14 +178,3 @@ class DriveTrigger:
     def next_ns(self) -> int | None:
         """When the next interrupt comes."""
         return self._task.port.next_ns
-
-
-def usual_trigger(task: Task, events: Events, scheduler: Scheduler, expired: Callable[[Task], None]) -> Trigger:
-    """Return the trigger of a Processor's task: the event that its SCAN_LOOP names, else the clock (4.0).
-
-    ``expired`` is called with the task when a hardware event was not set within its TIMEOUT.
-    """
-    event = task.compiled.program.event
-    if event is None:
-        return ClockTrigger(task, scheduler)
-    return EventTrigger(events.event(event), task, scheduler, lambda: expired(task))

@@ -16,7 +16,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from automax_ros.rack.modules.timed import Timed
+from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rackfile.model.driven import DrivenPlant
 from automax_ros.rackfile.model.ros_names import load_topic
@@ -34,7 +34,7 @@ class DrivePlantNode(ModuleNode):
         site.stream.add_sink(outlets.get)
         modules = {module.config.slot: module for module in site.rack.modules}
         module = modules[driven.slot]
-        self._timing = module.timing if isinstance(module, Timed) else None
+        self._timing = module.timing if isinstance(module, DriveControllerModule) else None
         self._controls = SwitchOperations(site.rack)
         if driven.config.load.from_ros:
             target = f"the load of {driven.name}"

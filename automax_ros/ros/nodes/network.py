@@ -20,8 +20,8 @@ from automax_ros.messages.cdr.cdr import MAX_TRAILING, CdrError, decode, encode
 from automax_ros.messages.types.messages import NetworkDrop
 from automax_ros.messages.types.topics import NETWORK, Topic
 from automax_ros.rack.modules.module import Module
-from automax_ros.rack.modules.network import CYCLE_NS
-from automax_ros.rack.modules.network_drops import DropMessage, NetworkStatus, Sender, Station
+from automax_ros.rack.modules.network import CYCLE_NS, NetworkModule
+from automax_ros.rack.modules.network_drops import DropMessage, NetworkStatus, Sender
 from automax_ros.rackfile.model.ros_names import network_topic
 from automax_ros.rackfile.modules.network import HALF
 from automax_ros.rackfile.reading.names import is_rack_name
@@ -45,7 +45,7 @@ class NetworkNode(ModuleNode):
 
     def __init__(self, site: RackContext, module: Module) -> None:
         super().__init__(site, module.config.name)
-        assert isinstance(module, Station)
+        assert isinstance(module, NetworkModule)
         self._module, self._slot, self._model = module, module.config.slot, module.config.model
         name = network_topic(site.rack.config.namespace, module.network)
         self._waiting: deque[bytes] = deque(maxlen=MOST_WAITING)

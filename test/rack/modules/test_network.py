@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from automax_ros.rack.modules.network import CYCLE_NS
-from automax_ros.rack.modules.network_drops import MISSES, MOST_RIVALS, TIMEOUT_CYCLES, DropMessage, Hearing, Sender
+from automax_ros.rack.modules.network_drops import MISSES, MOST_RIVALS, TIMEOUT_CYCLES, DropMessage, Reception, Sender
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.loader import load
@@ -346,7 +346,7 @@ def test_strangers_with_many_names_are_a_few_rivals(cable, line):
 
 
 def test_a_sequence_goes_on_at_0():
-    hearing, sender = Hearing(), Sender(1, 2, "A")
+    hearing, sender = Reception(), Sender(1, 2, "A")
     last = (1 << 32) - 1
     assert hearing.take(sender, sound(sequence=last)) == 0
     assert hearing.take(sender, sound(sequence=0)) == 0
