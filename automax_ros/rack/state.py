@@ -18,9 +18,8 @@ from automax_ros.rack.modules.module import ModuleState
 class RackState:
     """All state on which the future of a rack depends, apart from its configuration and sources.
 
-    ``image`` is (view, element, value) of all of memory, ``forced`` the forced elements, ``events`` those kept for the
-    next task that waits, ``clock_since_ns`` since when the common clock runs, ``modules`` by slot, ``plants`` by name:
-    a module's state excludes its plant. ``under_forces`` are the values of ``forced`` without the forces.
+    ``image`` is (view, element, value) of all of memory, ``forced`` the forced elements, ``under_forces`` their values
+    without the forces; ``events`` are kept for the next task that waits. ``modules`` by slot exclude their ``plants``.
     """
 
     now_ns: int

@@ -1,7 +1,4 @@
-"""Problems of a running rack: counted, and reported in words the first time each occurs.
-
-The code that detects a problem counts it, and the program that runs the rack shows it: /rosout is not read meanwhile.
-"""
+"""Problems of a running rack: counted where they are detected, reported in words the first time each occurs."""
 
 from __future__ import annotations
 
@@ -24,10 +21,7 @@ class Health:
     _news: list[str] = field(default_factory=list)
 
     def note(self, kind: str, key: Hashable, text: Callable[[], str], *, times: int = 1, most: int = _MAX_KEYS) -> None:
-        """Count a problem of a kind; its text is news if none of this kind and key was noted before.
-
-        At most ``most`` keys of a kind are reported.
-        """
+        """Count a problem of a kind; its text is news if none of this kind and key was, of at most ``most`` keys."""
         self.counts[kind] += times
         known = self._keys.setdefault(kind, set())
         if key not in known and len(known) < most:

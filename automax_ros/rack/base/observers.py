@@ -18,8 +18,7 @@ _ON_TIME = frozenset({HALT, STEP, RESUME})
 class Operation:
     """An operation on a rack: ``what`` as in stimuli files, ``task`` if it concerns one.
 
-    ``ok`` is FALSE if it was refused; ``reason`` gives the reason of the refusal, or the cause. ``detail`` is the rest
-    of the request: ``REF% = 200`` of a force.
+    ``reason`` is the cause, or why it was refused (``ok`` FALSE), ``detail`` the rest: ``REF% = 200`` of a force.
     """
 
     at_ns: int
@@ -39,19 +38,15 @@ class RackObserver(Protocol):
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         """A task has executed a scan, or its part before SCAN_LOOP as scan 0, with these writes to memory."""
-        ...
 
     def written(self, writes: list[WriteGroup]) -> None:
         """Memory was written, or a view forced or released, from outside the tasks."""
-        ...
 
     def tuned(self, task: Task, now_ns: int) -> None:
         """A tunable of a task was set between two scans, or a local forced or released."""
-        ...
 
     def operated(self, operation: Operation) -> None:
         """The rack or a task was operated: put into RUN, stopped, reloaded, switched off ..."""
-        ...
 
 
 class Observers:

@@ -1,8 +1,7 @@
 """The part of a rack that is in one process: the whole rack, or some modules of a distributed one.
 
-A part has the tasks and plants of its modules; of other modules it has only the registers, which come over the bus
-(``rack/distributed``). Variables, writers and everything else with a number are those of the whole rack in every
-process.
+A part has the tasks and plants of its modules; of other modules it has only the registers (``rack/distributed``).
+All that has a number (variables, writers) is that of the whole rack.
 """
 
 from __future__ import annotations
@@ -28,11 +27,7 @@ class RackPart:
 
     @classmethod
     def of(cls, config: RackConfig, slots: Collection[int] | None) -> RackPart:
-        """Return the part with the modules in ``slots``, or the whole rack for None.
-
-        Raises:
-            ValueError: a slot is empty.
-        """
+        """Return the part with the modules in ``slots``, the whole rack for None; ValueError if a slot is empty."""
         there = frozenset(module.slot for module in config.modules)
         chosen = there if slots is None else frozenset(slots)
         if not chosen <= there:
@@ -69,7 +64,6 @@ class RackPart:
 
     @property
     def _names(self) -> frozenset[str | int]:
-        """Names of the tasks and plants, and slots of the modules, in this process."""
         return frozenset[str | int]([*self.slots, *self.tasks, *(plant.name for plant in self.plants)])
 
     @cached_property
@@ -103,7 +97,6 @@ class RackPart:
 
 
 def _coupled(plants: Sequence[PlantConfig]) -> dict[str, set[str]]:
-    """Return, for each plant, the plants whose shafts turn with its own, itself included."""
     groups = {plant.name: {plant.name} for plant in plants}
     for plant in plants:
         if plant.couple is not None:

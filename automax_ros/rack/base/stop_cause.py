@@ -46,10 +46,7 @@ class PowerReturn:
 
 @dataclass(frozen=True)
 class OperationsState:
-    """State that operations leave in a rack, apart from the state of tasks and memory.
-
-    ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that were deleted.
-    """
+    """What operations leave in a rack; AUTO RUN starts the tasks ``ran_at_power_off`` again."""
 
     powered: bool = True
     battery_good: bool = True

@@ -1,14 +1,13 @@
 """Synchronizes one process's part of a rack with the others: sends its writes, applies theirs; all images agree.
 
-The link observes the rack. A write by a task, an input or an operator of this process is recorded with its version and
-sent in a batch, one per scan and writer. A write of another process is applied between two scans if it is newer than
-the value held. The writes of a scan that the host delayed count from its deadline: if another process wrote the same
-variable after that, the other's value is restored (decision). A late scan does not see what others wrote after its
-deadline, or in a scan with the same deadline: that is applied after it (decision).
+A write by a task, an input or an operator of this process is recorded with its version and sent, in one batch per scan
+and writer. A write of another process is applied between two scans if it is newer than the value held. The writes of a
+scan that the host delayed count from its deadline: if another process wrote the same variable after that, the other's
+value is restored (decision). A late scan does not see what others wrote after its deadline, or in a scan with the same
+deadline: that is applied after it (decision).
 
-Presets are not sent, since every process writes them. Nor are writes that stimuli make at the same rack time in every
-process (``is_common``), except by the process with common memory: a process that joins in the middle of a wave gets the
-wave's values from it.
+Presets are not sent. Nor are writes that stimuli make at the same rack time in every process (``is_common``), except by
+the process with common memory: one that joins in the middle of a wave gets the wave's values from it.
 """
 
 from __future__ import annotations
@@ -92,8 +91,7 @@ class ImageSync:
     """The link of one process. ``seat`` is the slot that names it, ``standing`` the rack's stop state as known here.
 
     ``send`` receives each batch immediately; it may not write to the rack. ``is_common`` returns whether every process
-    makes the present writes. ``guard`` executes writes that were deferred, and handles their exceptions: a damaged
-    message of another process must not end this one.
+    makes the present writes. ``guard`` executes deferred writes and handles exceptions: a message may be damaged.
     """
 
     def __init__(
@@ -120,8 +118,6 @@ class ImageSync:
         self._memory.keep_causes()
         self._rack.observe(self)
 
-    # RackObserver
-
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
         """Send the writes of a scan."""
         if writes:
@@ -142,13 +138,8 @@ class ImageSync:
             seat = self._rack.config.common_memory_slot if self._is_common() else self.seat
             self.standing = StopState(max(operation.at_ns, self.standing.at_ns + 1), seat, cause)
 
-    # from other processes
-
     def receive(self, batch: Batch) -> None:
-        """Apply another process's writes that are newer than the values held. Between two scans.
-
-        If the host delayed this process, they are applied only after the scans that are due before them.
-        """
+        """Apply another process's writes that are newer, between two scans: after those that are due before them."""
         # Writes of start-up parts at the start of the rack are applied before the first scans.
         by_scan = batch.kind is WriteKind.COMMIT or (batch.kind is WriteKind.BASIC and batch.time_ns > 0)
         key = _AFTER_SCANS if by_scan else _BEFORE_SCANS
@@ -176,10 +167,7 @@ class ImageSync:
             self._guard(take)
 
     def last_of(self, seat: int) -> ImageCopy:
-        """Return what a process wrote within the last second, as held in this image, for all other processes.
-
-        If the process ended while it sent, some of them have its last batch and others do not.
-        """
+        """Return what a process wrote within the last second: others may lack the batch that it sent as it ended."""
         self.take_waiting()
         whole, since_ns = self.picture(), self._rack.now_ns - NS_PER_S
         values = tuple(held for held in whole.values if held.version[1] == seat and held.version[0] >= since_ns)
@@ -187,7 +175,7 @@ class ImageSync:
         return ImageCopy(whole.sequence, values, forces)
 
     def adopt(self, standing: StopState) -> None:
-        """Adopt another process's stop state if it is newer. Between two scans.
+        """Adopt another process's stop state if it is newer, between two scans.
 
         A part that is stopped already is not stopped again, which would clear what was set meanwhile (decision).
         """
@@ -269,7 +257,6 @@ class ImageSync:
             self._write(held.view, held.element, value, PRESET_WRITER, WriteKind.OUTSIDE)
 
     def _fitting(self, view: int, element: int, value: Value) -> Value | None:
-        """Return a value as its variable holds it; None if it does not fit: a message may be damaged."""
         if not 0 <= view < len(self._memory.specs):
             return None
         try:
@@ -298,14 +285,10 @@ class ImageSync:
             self._memory.release(force.view, force.element, writer)
 
     def _tell(self) -> None:
-        """Report received writes to observers, without sending them back."""
         self._memory.take_causes()
         self._rack.observers.tell_writes()
 
-    # to other processes
-
     def _collect(self) -> None:
-        """Record and send what was written here since the last call."""
         causes = self._memory.take_causes()
         for (time_ns, writer, kind), group in groupby(causes, key=lambda write: write[1:4]):
             entries = tuple((write.view, write.element, write.value) for write in group)
@@ -336,7 +319,6 @@ class ImageSync:
             self._repair(repairs)
 
     def _note_force(self, force: HeldForce) -> None:
-        """Record a force of this process, or restore a newer one."""
         key = force.view, force.element
         known = self._forces.get(key)
         if known is None or known[0] <= force.version:
@@ -347,7 +329,6 @@ class ImageSync:
             self._memory.release(force.view, force.element, PRESET_WRITER)
 
     def _repair(self, repairs: Iterable[Part | VersionedValue]) -> None:
-        """Restore values that are newer than what was written here."""
         memory = self._memory
         memory.now_ns = self._rack.now_ns
         for item in repairs:

@@ -34,10 +34,7 @@ class VersionedValue(NamedTuple):
 
 @dataclass(frozen=True)
 class MergeResult:
-    """Result of comparing a write with an image: ``whole`` to apply it as it is, else ``rest`` to write instead.
-
-    ``rest`` are the bits of registers (view of the bank, register, bits, mask) that are newer than those held.
-    """
+    """Whether a write is to be applied as a ``whole``, else the newer bits of registers (``rest``) to write instead."""
 
     whole: bool
     rest: tuple[Part, ...] = ()

@@ -1,22 +1,21 @@
 """A drive I/O controller 57C406 of a running rack: it interrupts, measures the drive and fires its gates (52.0, 52.7).
 
 It is the ``DrivePort`` of the current minor loop (CML) task that names its slot. While that task runs it interrupts six
-times per line cycle, measures its plant at that instant and makes a scan of the task due; then it executes the command
-of the scan: gates, the contactor's relay, the outputs of the drive digital I/O module. Without such a task gates and
-relays are off. The plant continues in any case, whether the rack runs, is stopped or has no power (decision).
+times per line cycle, measures its plant and makes a scan of the task due, whose command it executes: gates, the
+contactor's relay, the outputs of the drive digital I/O module. Without such a task gates and relays are off. The plant
+continues in any case, whether the rack runs, is stopped or has no power (decision).
 
 Its registers are outputs: the task's initialisation gives them their defaults, STOP ALL and a loss of power 0 (2.4.5).
 The contactor follows the task's command; a force on the point of a relay only changes what the point shows (decision).
 
-Each access to it delays its microprocessor (52.7). Its firing circuit works independently meanwhile, so only the
-microprocessor's work is late: accepting the loop's command. In modeled execution a command takes effect later by
-``ACCESS_NS`` for each common on its registers that a scan of any task has latched, read or written since the interrupt,
-at most until the next one; accesses after the command delay nothing. Accesses by the loop itself and from outside do
-not count, nor do those that a distributed rack makes in another process (decision).
+Each access to it delays its microprocessor (52.7), and so the loop's command, not the firing circuit. In modeled
+execution a command takes effect later by ``ACCESS_NS`` for each common on its registers that a scan of any task has
+latched, read or written since the interrupt, at most until the next one. Accesses by the loop itself, from outside and
+in another process do not count (decision).
 
-On its front are a test switch A, centre, B and a fault reset switch (52.1.6). Both are momentary. The test switch is
-held in its position until it is moved to the centre; the fault reset switch is pressed for half a second, or as long as
-``false`` says (decision). They are only inputs: their effect is up to the application.
+On its front are a test switch A, centre, B and a fault reset switch (52.1.6). The test switch is held in its position
+until it is moved to the centre; the fault reset switch is pressed for half a second, or as long as ``false`` says
+(decision). They are only inputs: their effect is up to the application.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.drive import ACCESS_NS, DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
-from automax_ros.runtime.time.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
+from automax_ros.runtime.time.scheduler import NO_EVENT, EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
 
 USUAL_NS = 2_777_778
 """Time between two interrupts until a task sets it, ns: a sixth of a cycle at 60 Hz (decision)."""
@@ -68,10 +67,7 @@ REST_NS = 5_500_000
 
 @dataclass
 class InterruptTiming:
-    """Lateness of interrupts on the wall clock: how many came, how many of them more than ``LATE_NS`` late.
-
-    In simulated time none is late.
-    """
+    """Lateness of interrupts on the wall clock, and how many were more than ``LATE_NS`` late; none if simulated."""
 
     interrupts: int = 0
     late: int = 0
@@ -198,7 +194,8 @@ class FrontSwitches:
 
     def state(self) -> dict[str, object]:
         """Return their positions, and when the fault reset switch is released, ns."""
-        return {"test": self._test, "pressed_until_ns": self._scheduler.due_ns(self._release)}
+        until_ns = None if self._release is None else self._scheduler.due_ns(self._release)
+        return {"test": self._test, "pressed_until_ns": until_ns}
 
     def load(self, state: ModuleState) -> None:
         """Restore a state."""
@@ -240,7 +237,7 @@ class DriveControllerModule:
         self._digital = DriveDigital(parts.memory, parts.backplane, parts.scheduler, self._writer)
         self._measured = Measured(0)
         self._rest_key = EventKey(EventClass.IO, config.slot, "rest")
-        self._rest: ScheduledEvent | None = None
+        self._rest = NO_EVENT
         self._accesses = 0
         self._command_key = EventKey(EventClass.IO, config.slot, "command")
         self._delayed: tuple[Command, ScheduledEvent] | None = None
@@ -286,7 +283,7 @@ class DriveControllerModule:
         self._measured = Measured(*state["measured"])
         self._controller.load(state["firing"])
         self._digital.serve(state["digital"])
-        self._end_rest()
+        self._rest.cancel()
         if state["rest_ns"] is not None:
             self._rest_from(state["rest_ns"])
         self._forget_accesses()
@@ -322,7 +319,7 @@ class DriveControllerModule:
 
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
         """Interrupt at ``first_ns`` and from then on."""
-        self._end_rest()
+        self._rest.cancel()
         self._interrupts.arm(first_ns, key, due)
 
     def disarm(self) -> None:
@@ -403,13 +400,8 @@ class DriveControllerModule:
 
     def _rest_from(self, first_ns: int) -> None:
         if self._plant is not None:
-            self._end_rest()
-            self._rest = self._scheduler.at(first_ns, self._rest_key, self._update)
-
-    def _end_rest(self) -> None:
-        if self._rest is not None:
             self._rest.cancel()
-            self._rest = None
+            self._rest = self._scheduler.at(first_ns, self._rest_key, self._update)
 
     def _update(self, now_ns: int) -> None:
         """Advance the plant while it is not driven; no update is left out if the host is late."""

@@ -1,7 +1,4 @@
-"""The modules next to a 57C406: the drive digital I/O module, which DIG_IO_SLOT of the CML task names, and the 57C405.
-
-The 57C405 shows the armature voltage that is wired to it (52.6.1).
-"""
+"""The modules next to a 57C406: the drive digital I/O, and the 57C405, which shows the armature voltage (52.6.1)."""
 
 from __future__ import annotations
 
@@ -51,10 +48,7 @@ class DriveAnalogModule(IoModule):
 
 
 class DriveDigital:
-    """Reads the drive's inputs and sets its outputs, in ``slot``, None until a task names it.
-
-    A slot without such registers reads 0 and ignores outputs.
-    """
+    """The drive's inputs and outputs, in the ``slot`` that a task names; one without such registers reads 0."""
 
     def __init__(self, memory: CommonMemory, backplane: Backplane, scheduler: Scheduler, writer: int) -> None:
         """Create without a module; ``writer`` is the id under which outputs are written."""

@@ -3,7 +3,7 @@
 Interrupts come at whole periods after the clock was turned on, a period being (period register + 1) x 0.5 ms. They need
 the clock, an installed task with an EVENT on its ISCR and the enable bit, if the module has one: they start when the
 last of the three is there, and a new period counts from the same start of the clock (decision). Interrupts of one
-instant come in the order of slots, before all scans. A module without a clock does not interrupt.
+instant come in the order of slots, before all scans.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.module import Interrupt, ModuleConfig
 from automax_ros.runtime.memory.process_inputs import Freezer
-from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
+from automax_ros.runtime.time.scheduler import NO_EVENT, EventClass, EventKey
 
 _COUNTER_BITS = 24
 
@@ -84,11 +84,7 @@ class IoModule:
         return {str(item.status): item.state() for item in self._interrupts}
 
     def load(self, state: ModuleState) -> None:
-        """Restore a state.
-
-        Raises:
-            ValueError: the state is that of another module.
-        """
+        """Restore a state; ValueError if it is that of another module."""
         if set(state) != {str(item.status) for item in self._interrupts}:
             raise ValueError(f"{self.config.name} has other interrupts")
         for item in self._interrupts:
@@ -132,21 +128,19 @@ class IoModule:
 
 
 class _PeriodicInterrupt:
-    """One interrupt of a module, with the inputs that freeze at it."""
-
     def __init__(self, slot: int, bank: int, interrupt: Interrupt, parts: RackServices) -> None:
         assert interrupt.period is not None
         self.status = interrupt.status
         self._bank, self._period, self._enable, self._parts = bank, interrupt.period, interrupt.enable, parts
         self._key = EventKey(EventClass.IO, slot, f"{interrupt.status:05}")
         self._freezer = Freezer(parts.memory.registers.showing(bank, interrupt.inputs))
-        self._event: ScheduledEvent | None = None
+        self._event = NO_EVENT
 
     def schedule(self) -> None:
         since, period = self._parts.clock.since_ns, self._period_ns
         if since is None or not self._is_enabled:
-            self._cancel()
-        elif self._event is None or self._event.period_ns != period:
+            self._event.cancel()
+        elif self._event.cancelled or self._event.period_ns != period:
             passed = (self._parts.scheduler.now_ns - since) // period
             self._begin(since + (passed + 1) * period)
 
@@ -158,7 +152,7 @@ class _PeriodicInterrupt:
         return {"next_ns": self._parts.scheduler.due_ns(self._event), **self._freezer.state()}
 
     def load(self, state: ModuleState) -> None:
-        self._cancel()
+        self._event.cancel()
         if state["next_ns"] is not None:
             self._begin(state["next_ns"])
         self._parts.inputs.load(self._freezer, state["owed"], state["kept"])
@@ -174,13 +168,8 @@ class _PeriodicInterrupt:
         return bool(wanted) and self._parts.interrupts.is_enabled(self._bank, self.status)
 
     def _begin(self, first_ns: int) -> None:
-        self._cancel()
+        self._event.cancel()
         self._event = self._parts.scheduler.every(self._period_ns, first_ns, self._key, self._happen)
-
-    def _cancel(self) -> None:
-        if self._event is not None:
-            self._event.cancel()
-            self._event = None
 
     def _happen(self, now_ns: int, skipped: int) -> None:
         interrupts, inputs = self._parts.interrupts, self._parts.inputs
@@ -190,5 +179,4 @@ class _PeriodicInterrupt:
 
 
 def _counted(value: Value) -> Value:
-    """Return a number as a counter of 24 bits holds it."""
     return sign_extended(int(value), _COUNTER_BITS)

@@ -41,11 +41,7 @@ class Module(Protocol):
         ...
 
     def load(self, state: ModuleState) -> None:
-        """Restore a state, in place of ``power_on``.
-
-        Raises:
-            ValueError: the state does not fit.
-        """
+        """Restore a state, in place of ``power_on``; ValueError if it does not fit."""
 
 
 @runtime_checkable
@@ -56,11 +52,7 @@ class Operable(Protocol):
     def controls(self) -> Mapping[str, tuple[str, ...]]: ...  # noqa: D102
 
     def operate(self, verb: str, value: str) -> None:
-        """Move a control of ``controls`` to one of its positions.
-
-        Raises:
-            OperationRefused: it cannot be moved now.
-        """
+        """Move a control to one of its positions; OperationRefused if it cannot be moved now."""
 
 
 @dataclass
@@ -89,10 +81,7 @@ class QuietModule:
 
 
 class ProcessorModule(QuietModule):
-    """A Processor with its tasks, which the rack puts into RUN, in the order of all its Processors.
-
-    Locals, tunables and error logs stay at STOP ALL and without power (2.4.5).
-    """
+    """A Processor: the rack puts its tasks into RUN. Locals, tunables, error logs stay without power (2.4.5)."""
 
     def power_off(self) -> None:
         """Stop the tasks."""
@@ -104,11 +93,7 @@ class ProcessorModule(QuietModule):
         return {item.task.name: item.state() for item in self.tasks}
 
     def load(self, state: ModuleState) -> None:
-        """Restore the state of each task; those that ran continue with their next scan.
-
-        Raises:
-            ValueError: it is that of a module with other tasks, or does not fit a task.
-        """
+        """Restore the state of each task; those that ran continue. ValueError if it does not fit the tasks."""
         if set(state) != {item.task.name for item in self.tasks}:
             raise ValueError(f"{self.config.name} has the tasks {[item.task.name for item in self.tasks]}")
         for item in self.tasks:

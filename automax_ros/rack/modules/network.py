@@ -3,18 +3,17 @@
 With power, it sends once per cycle of 5.5 ms of rack time. The master sends the broadcast registers and its half of
 each drop that has a variable in its rack file or to which a task has written since power-up (decision: a drop of its
 own is not sent because a stranger claims to be there). A slave sends, while it receives from the master, its half of
-the drops that it represents. The module writes received words into registers, between two scans, at the instant of
-their arrival, and they are recorded like any other write: a replay needs no network. The length of the cycle is ours,
-after the tick of a Processor (decision): no source at hand prints one. A host that is late skips cycles, which do not
-count as time-outs (decision).
+the drops that it represents. Received words are written at the instant of their arrival, between two scans, and
+recorded like any other write. The length of the cycle is ours, after the tick of a Processor (decision): no source at
+hand prints one. A host that is late skips cycles, which do not count as time-outs (decision).
 
 A lost drop keeps its last values; its status bits are cleared and the module shows the code C until the drop is
-received again; that no task stops for it is ours (decision). STOP ALL clears outputs, so that the others see 0; the
-depth of a slave stays as it was defined (decision). Without power the module sends nothing and loses its memory.
+received again; that no task stops for it is ours (decision). STOP ALL clears outputs; the depth of a slave stays as it
+was defined (decision). Without power the module sends nothing and loses its memory.
 
-The drop depth is 1 after power-up; register 20 shows 0 then, so that a task's 1 can be recognized (decision). The
-module processes a task's write to it at its next cycle. Until then a drop does not communicate: its status bits are 0.
-Counters are shown at every sixteenth cycle (decision: each showing is an entry of the write log).
+The drop depth is 1 after power-up; register 20 shows 0 then, so that a task's 1 can be recognized (decision). A task's
+write to it is processed at the next cycle. Until then a drop does not communicate: its status bits are 0. Counters are
+shown at every sixteenth cycle (decision: each showing is an entry of the write log).
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ from automax_ros.rackfile.modules.network import (
     from_slave,
     greatest_depth,
 )
-from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
+from automax_ros.runtime.time.scheduler import NO_EVENT, EventClass, EventKey
 
 CYCLE_NS = 5_500_000
 """Time between two frames of a drop, ns."""
@@ -82,7 +81,7 @@ class NetworkModule(QuietModule):
         self._named = sorted(drops - {MASTER})  # those in whose areas the rack file has variables
         self._reception = Reception(self._named if self._is_master else (MASTER,))
         self._key = EventKey(EventClass.IO, config.slot, "network")
-        self._event: ScheduledEvent | None = None
+        self._event = NO_EVENT
         self._written: set[int] = set()
         for drop in range(1, LAST_DROP + 1) if self._is_master else ():
             for number in from_master(drop) if drop not in self._named else ():
@@ -97,7 +96,7 @@ class NetworkModule(QuietModule):
 
     def receive(self, frames: Iterable[tuple[Sender, DropMessage]], damaged: int = 0) -> None:
         """Process received frames, between two scans, and count those that could not be read."""
-        if self._event is None:
+        if self._event.cancelled:
             return
         self._count["unreadable"] += damaged
         for sender, frame in frames:
@@ -117,7 +116,7 @@ class NetworkModule(QuietModule):
             reception.received,
             reception.lost,
             tuple(sorted(reception.rivals)),
-            LOST_CODE if self._event is not None and reception.lost else "",
+            LOST_CODE if reception.lost and not self._event.cancelled else "",
             tuple((name, count & _WORD) for name, count in self._count.items()),
         )
 
@@ -129,9 +128,7 @@ class NetworkModule(QuietModule):
 
     def power_off(self) -> None:
         """Stop sending; its memory is lost."""
-        if self._event is not None:
-            self._event.cancel()
-            self._event = None
+        self._event.cancel()
         for number in range(self.config.registers.count):
             self._write(number, 0)
 
@@ -149,11 +146,7 @@ class NetworkModule(QuietModule):
         }
 
     def load(self, state: ModuleState) -> None:
-        """Restore a state, with the registers of that time.
-
-        Raises:
-            ValueError: the state is that of another module.
-        """
+        """Restore a state, with the registers of that time; ValueError if it is that of another module."""
         if set(state) != set(self.state()) or set(state["count"]) != set(_COUNTERS):
             raise ValueError(f"{self.config.name} has another state")
         self._depth, self._defined, self._sequence = state["depth"], state["defined"], state["sequence"]
@@ -198,7 +191,6 @@ class NetworkModule(QuietModule):
         self._parts.tell_writes()
 
     def _process_depth(self) -> None:
-        """Process a depth that a task wrote into the register since the last cycle."""
         word = self._read(DEPTH)
         if word == 0 or word & DONE:
             return
@@ -228,7 +220,6 @@ class NetworkModule(QuietModule):
                 self._write(STATUS[index], bits)
 
     def _sent(self) -> Iterable[int]:
-        """Return the drops of which it sends a half in each cycle."""
         if not self._is_master:
             return self._drops
         return [MASTER, *sorted({*self._named, *self._written})]
@@ -239,7 +230,6 @@ class NetworkModule(QuietModule):
         return DropMessage(self._drop, self._depth, self._defined, drop, self._sequence % (1 << 32), words)
 
     def _take(self, sender: Sender, frame: DropMessage) -> None:
-        """Process a valid frame: from the other side, or from a rival that uses drops of this module."""
         from_the_master = frame.station == MASTER
         if self._is_master == from_the_master:
             if from_the_master or not set(self._drops).isdisjoint(frame.drops):

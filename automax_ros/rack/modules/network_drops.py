@@ -3,10 +3,7 @@
 A cycle without a frame of a drop counts as silence; ``TIMEOUT_CYCLES`` of them are a receive time-out, and ``MISSES``
 time-outs in a row lose the drop (57C570 manual p. 18-6), after 88 ms. The length of a time-out is ours (decision): no
 source at hand prints it, and the loss of a station is reported within 100 ms, as that of a process of a distributed
-rack.
-
-Modules make and process frames; a carrier transmits them. Nothing here depends on ROS 2: ``ros/nodes/network.py`` is
-such a carrier, tests are others.
+rack. A carrier transmits the frames: ``ros/nodes/network.py``, or a test.
 """
 
 from __future__ import annotations
@@ -27,10 +24,9 @@ _WRAP = 1 << 32
 class DropMessage:
     """The registers that one station sends of one drop, once per cycle.
 
-    ``station`` is the drop of the sender, ``depth`` how many drops it represents and ``defined`` whether a task has set
-    the depth. ``drop`` is the drop of these registers: one of the sender's own if it is a slave; 0 in the master's
-    frame of the broadcast registers. ``words`` are 32 signed numbers of 16 bits: the half of the area that the sender
-    writes. ``sequence`` counts the sender's cycles modulo 2^32.
+    ``station`` is the sender's drop, ``depth`` how many drops it represents, ``defined`` whether a task has set that.
+    ``drop`` is one of the sender's own, or 0 in the master's frame of the broadcast registers. ``words`` are 32 signed
+    numbers of 16 bits: the half of the area that the sender writes. ``sequence`` counts its cycles modulo 2^32.
     """
 
     station: int
@@ -174,11 +170,7 @@ class Reception:
         return {"drops": drops, "rivals": [[*astuple(item), silent] for item, silent in sorted(self.rivals.items())]}
 
     def load(self, drops: Iterable[Sequence[Any]], rivals: Iterable[Sequence[Any]]) -> None:
-        """Restore a state.
-
-        Raises:
-            TypeError: it is not a state.
-        """
+        """Restore a state; TypeError if it is not one."""
         self.drops = {
             number: Drop(None if sender is None else Sender(*sender), *rest) for number, sender, *rest in drops
         }

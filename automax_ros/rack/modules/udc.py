@@ -37,7 +37,7 @@ from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.private_image import LocalMemory
 from automax_ros.runtime.memory.registers import RegisterMap
 from automax_ros.runtime.tasks.task import Status, Task
-from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
+from automax_ros.runtime.time.scheduler import NO_EVENT, EventClass, EventKey
 
 Key = tuple[int, int]
 """View and element."""
@@ -83,7 +83,6 @@ def _sent_with(name: str, bank: int, memory: CommonMemory) -> range:
 
 
 def _copied(registers: Iterable[int], written: dict[int, str], bank: int, views: RegisterMap) -> Copied:
-    """Return the copies of some registers: in with all views that show them, out by whole words."""
     in_order = sorted(registers)
     inputs = views.showing(bank, [register for register in in_order if register not in written])
     outputs: dict[str, tuple[Key, ...]] = {}
@@ -95,8 +94,6 @@ def _copied(registers: Iterable[int], written: dict[int, str], bank: int, views:
 
 
 class _Trigger:
-    """Reports to the module whether its task may scan; the module decides when a scan is due."""
-
     def __init__(self, module: UdcModule, task: Task) -> None:
         self._module, self.task = module, task
         self.armed = False
@@ -135,7 +132,7 @@ class UdcModule:
         self._current: ScheduledTask | None = None
         self._scanning = False
         self._skipped = 0
-        self._event: ScheduledEvent | None = None
+        self._event = NO_EVENT
         self._key = EventKey(EventClass.SCAN, 0, config.name)
         self._triggers: dict[str, _Trigger] = {}
         execution = parts.execution(config.name)
@@ -180,8 +177,8 @@ class UdcModule:
         self._pmis.follow()
         clock, running = self._parts.clock, self._taking_part()
         if not clock.runs or not running:
-            self._cancel()
-        elif self._event is None or self._event.period_ns != running[0].task.period_ns:
+            self._event.cancel()
+        elif self._event.cancelled or self._event.period_ns != running[0].task.period_ns:
             self._scan_from(clock.next_ns)
 
     def left_out(self, task: Task) -> None:
@@ -208,11 +205,7 @@ class UdcModule:
         }
 
     def load(self, state: ModuleState) -> None:
-        """Restore a state, in the middle of a scan if need be.
-
-        Raises:
-            ValueError: it is that of a module with other tasks, or does not fit a task.
-        """
+        """Restore a state, even in the middle of a scan; ValueError if it is that of other tasks, or does not fit."""
         own = {item.name: item for item in self.tasks}
         if set(state["tasks"]) != set(own):
             raise ValueError(f"{self.config.name} has the tasks {sorted(own)}")
@@ -224,7 +217,7 @@ class UdcModule:
         self._count, self._missed, self._scanning = state["count"], state["missed"], state["scanning"]
         self._current = own[state["current"]] if state["current"] is not None else None
         self._rest = [own[name] for name in state["rest"]]
-        self._cancel()
+        self._event.cancel()
         if state["scan_ns"] is not None:
             self._scan_from(state["scan_ns"])
         self._pmis.load(state["pmis"])
@@ -238,7 +231,6 @@ class UdcModule:
         return bool(running & own if own else running)
 
     def _trigger(self, task: Task) -> _Trigger:
-        """Return the trigger of a task as it is installed; the copies depend on its source."""
         self._copies = None
         self._triggers[task.name] = made = _Trigger(self, task)
         return made
@@ -247,14 +239,9 @@ class UdcModule:
         return [item for item in self.tasks if self._triggers[item.name].armed and item.task.status is Status.RUNNING]
 
     def _scan_from(self, first_ns: int) -> None:
-        self._cancel()
+        self._event.cancel()
         period_ns = self._taking_part()[0].task.period_ns
         self._event = self._parts.scheduler.every(period_ns, first_ns, self._key, self._scan)
-
-    def _cancel(self) -> None:
-        if self._event is not None:
-            self._event.cancel()
-            self._event = None
 
     def _scan(self, now_ns: int, skipped: int) -> None:
         """Start a scan of the module; if the last one is still in progress, its task has overlapped (code 14)."""
@@ -262,7 +249,7 @@ class UdcModule:
             self._current.due(now_ns, skipped)
             return
         if not self._taking_part():
-            self._cancel()
+            self._event.cancel()
             return
         self._skipped = skipped
         self._begin(now_ns, skipped)
@@ -292,7 +279,6 @@ class UdcModule:
             image.take_forced()
 
     def _go_on(self, now_ns: int) -> None:
-        """Execute the next task's scan; after the last one the module's scan ends."""
         while self._rest:
             self._current = item = self._rest.pop(0)
             if self._triggers[item.name].armed and item.task.status is Status.RUNNING:
@@ -304,7 +290,6 @@ class UdcModule:
             self._end(now_ns)
 
     def _has_run(self, task: Task) -> None:
-        """Copy out what a task wrote in its scan, and continue with the next task."""
         if self._current is None or self._current.task is not task or not self._scanning:
             return
         self._current = None

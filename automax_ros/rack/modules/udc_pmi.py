@@ -65,11 +65,7 @@ class UdcPmis:
         return {link.drive: link.state() for link in self._links}
 
     def load(self, state: Mapping[str, ModuleState]) -> None:
-        """Restore a state.
-
-        Raises:
-            ValueError: it is that of other drives, or not one of PMIs.
-        """
+        """Restore a state; ValueError if it is that of other drives, or not one of PMIs."""
         if set(state) != {link.drive for link in self._links}:
             raise ValueError(f"{self._name} has PMIs for other drives")
         for link in self._links:
@@ -101,8 +97,6 @@ class UdcPmis:
 
 
 class _Link:
-    """The connection of one PMI."""
-
     def __init__(self, udc: UdcPmis, drive: str, pmi: Pmi, slot: int) -> None:
         self.drive, self.base = drive, table.DRIVE_B if drive == "B" else 0
         self.event: ScheduledEvent | None = None

@@ -26,8 +26,6 @@ _AFTER_MODULES = 16
 
 
 class _Feed:
-    """A feed, with the place in memory to which it writes."""
-
     __slots__ = ("_scale", "_signal", "element", "view", "writer")
 
     def __init__(self, config: FeedConfig, view: int, writer: int) -> None:
@@ -41,8 +39,6 @@ class _Feed:
 
 
 class _Round:
-    """Feeds of one plant that are written together."""
-
     def __init__(
         self,
         plant: DrivePlant,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from automax_ros.drive.base.errors import DriveError
 from automax_ros.drive.base.state import SavedState
@@ -11,36 +11,20 @@ from automax_ros.drive.plant.plant import DrivePlant
 from automax_ros.rackfile.model.plants import PlantConfig, build_plants, couple_plants
 
 
-class RackPlants(Mapping[str, DrivePlant]):
+class RackPlants(dict[str, DrivePlant]):
     """The plants with a motor, by name. They continue whether or not the rack has power."""
 
     def __init__(self, configs: Sequence[PlantConfig]) -> None:
         """Create all plants, at rest, and couple them."""
-        self._plants = build_plants(configs)
-        self._parts: dict[str, DrivePlant | CoupledPlants] = {
-            **self._plants,
-            **couple_plants(self._plants, configs),
-        }
-
-    def __getitem__(self, name: str) -> DrivePlant:
-        return self._plants[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._plants)
-
-    def __len__(self) -> int:
-        return len(self._plants)
+        super().__init__(build_plants(configs))
+        self._parts: dict[str, DrivePlant | CoupledPlants] = {**self, **couple_plants(self, configs)}
 
     def state(self) -> dict[str, SavedState]:
         """Return the whole state, by plant; that of a coupling by the names of both plants."""
         return {name: part.state() for name, part in self._parts.items()}
 
     def load(self, state: Mapping[str, SavedState]) -> None:
-        """Restore a state.
-
-        Raises:
-            ValueError: it is not that of these plants.
-        """
+        """Restore a state; ValueError if it is not that of these plants."""
         if set(state) != set(self._parts):
             raise ValueError("the state is that of a rack with other plants")
         try:

@@ -1,8 +1,8 @@
 """Samples all plants of a rack at a fixed rate of rack time, for streams and reports.
 
-They are sampled even if there is no observer: the instants at which a plant's time is advanced decide the last bits of
-its numbers, and a run that is watched must be the same as one that is not (decision). For the same reason no sample is
-left out if the host is late: late ones follow in order, as the interrupts of drives do (decision).
+They are sampled without an observer too: the instants at which a plant's time is advanced decide the last bits of its
+numbers, and a run that is watched must be the same as one that is not (decision). So no sample is left out if the host
+is late: late ones follow in order, as the interrupts of drives do (decision).
 """
 
 from __future__ import annotations

@@ -32,15 +32,9 @@ class RackError(Exception):
 
 @dataclass(frozen=True)
 class PreparedReload:
-    """Another source for a task, checked and compiled, ready for installation.
+    """Another source for a task, checked and compiled; ``compiled`` is None with a ``fault`` that forbids installation.
 
-    Attributes:
-        task: its name.
-        source: the source.
-        compiled: the compiled task, None with a fault.
-        programs: those of all tasks once it is installed.
-        among: those of all tasks that it was checked against.
-        fault: why it cannot be installed.
+    ``programs`` are those of all tasks once it is installed, ``among`` those that it was checked against.
     """
 
     task: str
@@ -52,10 +46,7 @@ class PreparedReload:
 
 
 class Installation:
-    """All tasks of a rack, compiled.
-
-    ``warnings`` are those of their checks, ``native`` the outcome of native compilation for each task compiled here.
-    """
+    """All tasks of a rack, compiled; ``warnings`` are those of their checks, ``native`` the outcomes by task."""
 
     def __init__(
         self,
@@ -67,10 +58,8 @@ class Installation:
     ) -> None:
         """Check all tasks and compile them, or only those in ``here``; ``sources`` replace the tasks' files.
 
-        Scans in modeled time are executed in steps, which native scans do not have: none is made for them then.
-
-        Raises:
-            RackError: a task has errors; nothing is started then (the hardware's E0).
+        Scans in modeled time are executed in steps, so not made native. RackError if a task has errors: nothing is
+        started then (the hardware's E0).
         """
         self._config = config
         modeled = config.execution is Timing.MODELED
@@ -99,10 +88,7 @@ class Installation:
         self._cut = processes_of(config, self._programs.values()) if distributed else ()
 
     def again(self, config: RackConfig) -> Installation:
-        """Return the installation of another rack, which has the same tasks, modules and commons: nothing is compiled.
-
-        No rack may have reloaded tasks of this one.
-        """
+        """Return that of another rack with the same tasks, modules and commons; none of this one's may be reloaded."""
         other = copy(self)
         other._config = config
         other.sources, other._compiled = dict(self.sources), dict(self._compiled)
@@ -132,11 +118,7 @@ class Installation:
         return prepared.among is self._programs
 
     def take(self, prepared: PreparedReload) -> CompiledTask:
-        """Make a prepared source the task's program, and return it compiled.
-
-        Raises:
-            RackError: the source has errors.
-        """
+        """Make a prepared source the task's program, and return it compiled; RackError if it has errors."""
         if prepared.fault is not None:
             raise prepared.fault
         assert prepared.compiled is not None
@@ -185,7 +167,6 @@ class Installation:
 
 
 def _kind(program: Program) -> str:
-    """Return a program's kind of task: a running rack cannot change it."""
     if program.cml is not None:
         return f"a task of {program.cml.block.name}"
     return "a BASIC task" if program.kind is TaskKind.BASIC else "a control-block task"

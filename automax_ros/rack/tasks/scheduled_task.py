@@ -1,7 +1,4 @@
-"""A task of a running rack: its trigger, its execution, its statistics, and what follows each of its scans.
-
-Every scan goes through this file, so it is compiled ahead of time: see ``tools/compiled_groups.py``.
-"""
+"""A task of a running rack: its trigger, its execution, its statistics, and what follows each of its scans."""
 
 from __future__ import annotations
 
@@ -15,20 +12,16 @@ from automax_ros.rack.tasks.statistics import TaskStatistics
 from automax_ros.rack.tasks.triggers import Due, MakeTrigger
 from automax_ros.runtime.memory.process_inputs import ProcessInputs
 from automax_ros.runtime.scan.execution import Execution, IdealExecution, Steps
-from automax_ros.runtime.scan.scan_in_progress import Progress
 from automax_ros.runtime.tasks.task import OVERLAP, ScanRecord, Status, Task
 from automax_ros.runtime.time.scheduler import Scheduler
 
 _FAULTED: Final = Status.FAULTED
-"""A constant, since it is read after each scan and an enumeration's member is slow to get."""
+_RUNNING = Status.RUNNING
+"""Constants, since they are read at each scan and an enumeration's member is slow to get."""
 StopAll = Callable[[str, str | None, str], None]
 """Stops the rack: called with the reason, the hardware's code if there is one, and the task."""
-
-
 _LONGEST_NS = 2**32 - 1
 """Longest execution time that a message of a scan can hold."""
-_RUNNING = Status.RUNNING
-"""A constant, since it is read at each scan and an enumeration's member is slow to get."""
 After = Callable[[Task, ScanRecord | None], None]
 """Called right after each scan, and after the part before SCAN_LOOP."""
 
@@ -37,7 +30,7 @@ class ScanEnd:
     """Ends scans of one rack: observers are notified, waiting inputs unfreeze, a fault stops all."""
 
     def __init__(self, observers: Observers, inputs: ProcessInputs, stop_all: StopAll) -> None:
-        """Create from the observers, the inputs, and the function that stops the rack after a fault."""
+        """Create it; ``stop_all`` stops the rack after a fault."""
         self._observers, self._inputs, self._stop_all = observers, inputs, stop_all
 
     def ended(self, task: Task, record: ScanRecord | None) -> None:
@@ -132,11 +125,7 @@ class ScheduledTask:
         }
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Restore a state; a task that ran continues with the scan that was under way, or with its next one.
-
-        Raises:
-            ValueError: the state does not fit the task, or another source ran.
-        """
+        """Restore a state; a task that ran continues. ValueError if it does not fit, or another source ran."""
         if state["source"] != self.task.compiled.program.source_hash:
             raise ValueError(f"task {self.task.name} had another source: reload it first")
         if state["status"] not in Status.__members__:
@@ -151,7 +140,11 @@ class ScheduledTask:
             self.scan_from(state["next_ns"])
         place, progress = state["place"], state["progress"]
         if place is not None:
-            self._execution.resume(self, place, None if progress is None else self._resumed(progress))
+            steps = None
+            if progress is not None:
+                self._began_ns = progress["began_ns"]
+                steps = self.task.resume_scan(progress)
+            self._execution.resume(self, place, steps)
             self.task.wait_again(state["waiting"])
         self.task.hold(state["forced"])
 
@@ -208,7 +201,3 @@ class ScheduledTask:
         """Return how much later than its instant the host started a scan, by the pacer's clock."""
         zero_ns = self._scheduler.zero_ns
         return 0 if zero_ns is None else max(0, began_ns - zero_ns - now_ns)
-
-    def _resumed(self, progress: Progress) -> Steps:
-        self._began_ns = progress["began_ns"]
-        return self.task.resume_scan(progress)

@@ -8,10 +8,16 @@ from functools import cached_property
 
 from automax_ros.core.kinds import WriterKind
 from automax_ros.drive.plant.plant import DrivePlant
-from automax_ros.rack.tasks.basic_trigger import WaitTrigger
 from automax_ros.rack.tasks.installation import Installation
 from automax_ros.rack.tasks.scheduled_task import After, ScheduledTask
-from automax_ros.rack.tasks.triggers import ClockTrigger, DriveTrigger, EventTrigger, MakeTrigger, Trigger
+from automax_ros.rack.tasks.triggers import (
+    ClockTrigger,
+    DriveTrigger,
+    EventTrigger,
+    MakeTrigger,
+    Trigger,
+    WaitTrigger,
+)
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.module import TaskConfig
 from automax_ros.rackfile.model.writers import WriterSpec, writers_of

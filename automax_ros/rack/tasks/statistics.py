@@ -7,10 +7,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Times:
-    """Execution times and lateness of scans, ns.
-
-    Each scan counts once, stepped ones too, which are never late: rack time waits for them.
-    """
+    """Execution times and lateness of scans, ns; stepped scans are never late: rack time waits for them."""
 
     scans: int = 0
     skipped: int = 0
@@ -43,10 +40,9 @@ class Times:
 
 @dataclass
 class TaskStatistics(Times):
-    """Counts of one task since the rack was started; times in ns, of the host's where the rack has a stopwatch.
+    """Counts of one task since the rack was started; ``window`` counts since it was last taken.
 
-    In modeled execution they are modeled times, from a scan's start to its end. ``window`` counts since it was last
-    taken.
+    Times (ns) are the host's where the rack has a stopwatch, in modeled execution modeled ones, from start to end.
     """
 
     last_ns: int = 0

@@ -1,20 +1,21 @@
-"""Triggers a task's scans: by its Processor's clock, an event, a drive's 57C406, or the task's module."""
+"""Triggers a task's scans: by its Processor's clock, an event, a drive's 57C406, or what a BASIC task waits for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Protocol
 
-from automax_ros.core.ticks import UDC_TICK_NS
-from automax_ros.runtime.scan.events import Event
+from automax_ros.compile.base.scan_io import Suspension
+from automax_ros.core.ticks import NS_PER_S, UDC_TICK_NS
+from automax_ros.runtime.scan.channels import Channels
+from automax_ros.runtime.scan.events import Event, Events
+from automax_ros.runtime.tasks.basic_task import BasicTask
 from automax_ros.runtime.tasks.cml_task import CmlTask
-from automax_ros.runtime.tasks.task import Task
-from automax_ros.runtime.time.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
+from automax_ros.runtime.tasks.task import Status, Task
+from automax_ros.runtime.time.scheduler import NO_EVENT, EventClass, EventKey, PeriodicAction, Scheduler
 
 Due = PeriodicAction
 """Called when a scan is due, with the instant in ns and the number of instants skipped just before it."""
-
-
 LATE_NS = UDC_TICK_NS
 """A host that is this late may have skipped scans whose end interrupts."""
 _LAST = EventKey(EventClass.OBSERVE, 0, "")
@@ -25,11 +26,9 @@ class Trigger(Protocol):
 
     def arm(self, first_ns: int, due: Due) -> None:
         """Start: no scan is due before ``first_ns``."""
-        ...
 
     def disarm(self) -> None:
         """End; a second call does nothing."""
-        ...
 
     @property
     def next_ns(self) -> int | None:
@@ -49,7 +48,7 @@ class ClockTrigger:
         self._scheduler = scheduler
         self._period_ns = task.period_ns
         self._key = EventKey(EventClass.SCAN, task.priority, task.name)
-        self._event: ScheduledEvent | None = None
+        self._event = NO_EVENT
 
     def arm(self, first_ns: int, due: Due) -> None:
         """Schedule a scan at ``first_ns`` and each period after it."""
@@ -58,9 +57,7 @@ class ClockTrigger:
 
     def disarm(self) -> None:
         """Schedule no more scans."""
-        if self._event is not None:
-            self._event.cancel()
-            self._event = None
+        self._event.cancel()
 
     @property
     def next_ns(self) -> int | None:
@@ -79,7 +76,7 @@ class Timeout:
     def __init__(self, timeout_ns: int, key: EventKey, scheduler: Scheduler, expired: Callable[[], None]) -> None:
         """Create with the time and the function to call when it is over; it does not run yet."""
         self._timeout_ns, self._key, self._scheduler, self._expired = timeout_ns, key, scheduler, expired
-        self._end: ScheduledEvent | None = None
+        self._end = NO_EVENT
 
     def begin(self, since_ns: int) -> None:
         """Start the time at ``since_ns``, in place of an earlier start."""
@@ -88,9 +85,7 @@ class Timeout:
 
     def end(self) -> None:
         """Stop the time."""
-        if self._end is not None:
-            self._end.cancel()
-            self._end = None
+        self._end.cancel()
 
     def _over(self, now_ns: int) -> None:
         wall_ns = self._scheduler.wall_ns
@@ -99,7 +94,6 @@ class Timeout:
         elif now_ns < wall_ns:
             self._end = self._scheduler.at(wall_ns, _LAST, self._over)
         else:
-            self._end = None
             self._expired()
 
 
@@ -115,7 +109,7 @@ class EventTrigger:
         self._event, self._scheduler = event, scheduler
         self._key = EventKey(EventClass.SCAN, task.priority, task.name)
         self._due: Due | None = None
-        self._set: ScheduledEvent | None = None
+        self._set = NO_EVENT
         self._since_ns = 0
         program = task.compiled.program
         ticks = next((item.timeout for item in program.events if item.name == event.name), None)
@@ -135,9 +129,7 @@ class EventTrigger:
         self._event.forget(self._wake)
         if self._timeout is not None:
             self._timeout.end()
-        if self._set is not None:
-            self._set.cancel()
-            self._set = None
+        self._set.cancel()
 
     @property
     def next_ns(self) -> int | None:
@@ -178,3 +170,96 @@ class DriveTrigger:
     def next_ns(self) -> int | None:
         """When the next interrupt comes."""
         return self._task.port.next_ns
+
+
+RESUMED_LATE_NS = NS_PER_S
+"""A BASIC task that the host reaches later than this continues now (decision: it does not make up for lost time)."""
+
+
+class WaitTrigger:
+    """A burst is due when the task's wait ends: at that instant, in the task's place among all scans.
+
+    A hardware event that it waits on must come within its TIMEOUT, in ticks of the Processor, or ``expired`` is called
+    (decision: as for scans).
+    """
+
+    def __init__(
+        self, task: BasicTask, events: Events, channels: Channels, scheduler: Scheduler, expired: Callable[[], None]
+    ) -> None:
+        """Create for a task; nothing is scheduled yet."""
+        self._expired = expired
+        self._timeout: Timeout | None = None
+        self._task, self._events, self._channels, self._scheduler = task, events, channels, scheduler
+        self._key = EventKey(EventClass.SCAN, task.priority, task.name)
+        self._due: Due | None = None
+        self._event = NO_EVENT
+
+    def arm(self, first_ns: int, due: Due) -> None:
+        """Schedule the first burst at ``first_ns``; a task that waits already continues to wait."""
+        self.disarm()
+        self._due = due
+        self._task.suspended = self._suspended
+        if self._task.ready:
+            self._go_on_at(first_ns)
+        else:
+            self._wait()
+
+    def disarm(self) -> None:
+        """Schedule no more bursts."""
+        self._due = None
+        self._end_timeout()
+        self._task.suspended = lambda: None
+        self._channels.forget(self._wake)
+        for event in self._task.compiled.program.events:
+            self._events.event(event.name).forget(self._wake)
+        self._event.cancel()
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next burst is due; now, while that is not known."""
+        if self._due is None:
+            return None
+        due_ns = self._scheduler.due_ns(self._event)
+        return self._scheduler.now_ns if due_ns is None else due_ns
+
+    def _suspended(self) -> None:
+        if self._task.status is Status.RUNNING and self._due is not None:
+            self._wait()
+
+    def _wait(self) -> None:
+        task, (kind, number) = self._task, self._task.wish
+        if task.timed:
+            self._go_on_at(task.not_before(task.wake_ns))
+        elif kind == Suspension.EVENT:
+            event = self._events.event(task.compiled.program.events[number].name)
+            if event.wait(self._wake):
+                self._wake(task.memory.now_ns)
+            else:
+                ticks, tick_ns = task.compiled.program.events[number].timeout, task.compiled.program.tick_ns
+                if ticks:
+                    self._timeout = Timeout(ticks * tick_ns, self._key, self._scheduler, self._expired)
+                    self._timeout.begin(task.wake_ns)
+        elif kind in (Suspension.EMPTY, Suspension.FULL, Suspension.ABSENT):
+            self._channels.wait(Suspension(kind), number, self._wake)
+
+    def _wake(self, now_ns: int) -> None:
+        """Schedule the burst after the scan that wakes the task: it does not start inside another's scan."""
+        self._end_timeout()
+        self._task.make_ready()
+        self._go_on_at(self._task.not_before(now_ns))
+
+    def _end_timeout(self) -> None:
+        if self._timeout is not None:
+            self._timeout.end()
+            self._timeout = None
+
+    def _go_on_at(self, time_ns: int) -> None:
+        self._event = self._scheduler.at(max(time_ns, self._scheduler.now_ns), self._key, self._go_on)
+
+    def _go_on(self, now_ns: int) -> None:
+        if self._scheduler.wall_ns - now_ns > RESUMED_LATE_NS:
+            self._task.pass_over(self._scheduler.wall_ns)
+            self._go_on_at(self._scheduler.wall_ns)
+        elif self._due is not None:
+            self._task.go()
+            self._due(now_ns, 0)

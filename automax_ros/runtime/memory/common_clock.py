@@ -1,7 +1,7 @@
 """The common clock of a backplane (CCLK): which modules drive it, and since when it runs.
 
 A module drives it while the enable bit of one of its registers is set. Exactly one may (S-3056 p. 4-4): a second one is
-the fault of code 38. UDC tasks do not pass SCAN_LOOP, and modules do not interrupt, without it. The clock of the UDCs
+the fault of code 38. Without it UDC tasks do not pass SCAN_LOOP, and modules do not interrupt. The clock of the UDCs
 and that of the other modules are the same (decision: the manuals say so of neither).
 """
 
@@ -67,7 +67,6 @@ class CommonClock:
         return list(dict.fromkeys(set_bits))
 
     def _check_soon(self) -> None:
-        """Check the bits once the write that may have changed one is complete, still at this instant."""
         if not self._posted:
             self._posted = True
             self._scheduler.at(self._scheduler.now_ns, EventKey(EventClass.IO, 0, ""), self._check)

@@ -27,11 +27,7 @@ class Image:
         self._index = {spec.name: number for number, spec in enumerate(self.specs)}
 
     def view(self, name: str) -> int:
-        """Return the view of a variable by its full name.
-
-        Raises:
-            KeyError: the rack has no such variable.
-        """
+        """Return the view of a variable by its full name; KeyError if the rack has none."""
         return self._index[name]
 
     def plan(self, views: Sequence[int]) -> LatchPlan:

@@ -1,11 +1,8 @@
 """The common memory of a running rack: the four memory operations, forcing, and the ordered write log.
 
-- ``latch``: copies of simple views at the start of a scan;
-- ``commit``: the values that a scan's blocks changed, at END;
-- ``read_now`` and ``write_now``: actual memory, for BASIC statements, arrays, REALs and strings.
-
-A force applies to a view: latch and read_now return its value, writes are dropped. Every write that takes effect is an
-entry of the write log, if the log is kept.
+``latch`` copies simple views at the start of a scan, ``commit`` writes what its blocks changed, at END; ``read_now``
+and ``write_now`` use actual memory, for BASIC statements, arrays, REALs and strings. A force applies to a view: latch
+and read_now return its value, writes are dropped. Every write that takes effect is in the write log, if that is kept.
 """
 
 from __future__ import annotations
@@ -25,10 +22,7 @@ FORCING = "FORCINGSTATUS@"
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class CommonMemory(Image):
-    """The common variables and module registers of one rack.
-
-    ``now_ns`` is the time of entries in the write log; code that runs tasks or applies writes sets it.
-    """
+    """The common variables and module registers of one rack; ``now_ns`` is the time of entries in the write log."""
 
     def __init__(self, views: Sequence[ViewSpec]) -> None:
         """Create the memory as at installation: everything 0, nothing forced."""
@@ -53,24 +47,17 @@ class CommonMemory(Image):
         return self._sequence + self._gate[1]
 
     def committing(self) -> CellCommit | None:
-        """Return where native scans may store changed values, as ``commit`` would; None if ``commit`` is overridden.
-
-        They may while nothing is forced and no log is kept, since the log needs each value.
-        """
+        """Return where native scans store changed values while nothing is forced or logged; None if they may not."""
         overridden = type(self).commit is not CommonMemory.commit
         return None if overridden else CellCommit(self._cells, self._plain, self._gate)
 
     def _set_gate(self) -> None:
-        """Allow native scans to store values themselves, or forbid it, and count those that they have stored."""
         gate = self._gate
         self._sequence += gate[1]
         gate[0], gate[1] = not self._forced and self._log is None and self._causes is None, 0
 
     def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
-        """Write the values that a scan's blocks changed: pairs of view and value, already within the view's type.
-
-        The log refers to ``changes`` itself: it must not be changed any more.
-        """
+        """Write what a scan's blocks changed: (view, value), within its type. The log refers to ``changes`` itself."""
         if self._forced or self._causes is not None:
             self._commit_each(changes, writer)
             return
@@ -96,30 +83,18 @@ class CommonMemory(Image):
         self._store(view, element, value, writer, kind)
 
     def write_from_outside(self, view: int, value: Value, writer: int, element: int = 0) -> None:
-        """Write a value that comes from ROS, a preset or an operator.
-
-        Raises:
-            MemoryValueError: the value does not fit the variable's type, or the element does not exist.
-        """
+        """Write a value that comes from ROS, a preset or an operator; raises what ``accepted`` does."""
         self._store(view, element, self.accepted(view, value, element), writer, WriteKind.OUTSIDE)
 
     def accepted(self, view: int, value: Value, element: int = 0) -> Value:
-        """Return a value from outside as an element of the variable would store it, without writing it.
-
-        Raises:
-            MemoryValueError: the value does not fit the variable's type, or the element does not exist.
-        """
+        """Return a value from outside as an element would store it; MemoryValueError if that cannot be."""
         spec = self.specs[view]
         if not 0 <= element < spec.elements:
             raise MemoryValueError(f"{spec.name} has no element {element}: it has {spec.elements}")
         return fitting(spec, value)
 
     def force(self, view: int, value: Value, element: int = 0, writer: int = 0) -> None:
-        """Hold a value against every write until it is released.
-
-        Raises:
-            MemoryValueError: the value does not fit the variable's type.
-        """
+        """Hold a value against every write until it is released; raises what ``accepted`` does."""
         fit = self.accepted(view, value, element)
         self._under.setdefault((view, element), self.read_now(view, element))
         self._forced.discard((view, element))
@@ -138,10 +113,7 @@ class CommonMemory(Image):
             self._forces_changed(writer)
 
     def hold(self, forced: Iterable[tuple[int, int]], under: Iterable[tuple[int, int, Value]] = ()) -> None:
-        """Restore which values are forced, as ``load_image`` restores the values: nothing is logged.
-
-        ``under`` is what ``under_forces`` returned.
-        """
+        """Restore which values are forced, and ``under_forces``; nothing is logged."""
         self._forced = set(forced)
         self._set_gate()
         known = {(view, element): value for view, element, value in under}
@@ -165,7 +137,7 @@ class CommonMemory(Image):
         return (view, 0) in self._forced
 
     def under_force(self, view: int) -> Value:
-        """Return the value of a simple view without its force: the last write that reached memory, though dropped.
+        """Return the value of a simple view without its force: the last write, though dropped.
 
         What a block would write is dropped in its scan already, so it does not count (decision).
         """
@@ -181,10 +153,7 @@ class CommonMemory(Image):
         self._force_watchers.append(changed)
 
     def watch(self, bank: int, register: int, written: Callable[[], None]) -> None:
-        """Call ``written`` whenever a register of a module is written, directly or through a point.
-
-        It may only post an event, since the write may be one of several.
-        """
+        """Call ``written`` whenever a register is written, directly or through a point: it may only post an event."""
         self._watched.setdefault((bank, register), []).append(written)
 
     def watch_accesses(self, bank: int, accessed: Callable[[], None]) -> None:
@@ -213,10 +182,7 @@ class CommonMemory(Image):
         return [entry for group in self.take_writes() for entry in group.entries()]
 
     def keep_causes(self) -> None:
-        """Begin to keep the writes of named views, without their consequences on views of the same registers.
-
-        The caller must ``take_causes``.
-        """
+        """Begin to keep the writes of named views for ``take_causes``, without consequences on the same registers."""
         if self._causes is None:
             self._causes = []
             self._set_gate()
@@ -227,10 +193,7 @@ class CommonMemory(Image):
         return causes
 
     def clear(self, writer: int = 0, *, keep_non_volatile: bool = True, kept: Container[tuple[int, int]] = ()) -> None:
-        """Set volatile variables to 0, except forced ones: STOP ALL and system restart (2.4.5).
-
-        ``kept`` are views and elements that their module keeps, such as inputs. FORCINGSTATUS@ stays correct.
-        """
+        """Set volatile variables to 0, except forced ones and those ``kept``: STOP ALL and system restart (2.4.5)."""
         for view, spec in enumerate(self.specs):
             if spec.name == FORCING or (spec.non_volatile and keep_non_volatile):
                 continue
@@ -267,21 +230,17 @@ class CommonMemory(Image):
             self._causes.append(Write(self._sequence, self.now_ns, writer, kind, view, element, value))
         if entries:
             # A view that shares registers with a forced one is not forced itself.
-            told = WriteKind.OUTSIDE if kind in (WriteKind.FORCE, WriteKind.RELEASE) else kind
+            caused = WriteKind.OUTSIDE if kind in (WriteKind.FORCE, WriteKind.RELEASE) else kind
             for other, place, shown in entries:
                 self._put(other, place, shown)
                 self._sequence += 1
                 if self._log is not None:
-                    self._log.append(WriteGroup(self._sequence, self.now_ns, writer, told, place, ((other, shown),)))
+                    self._log.append(WriteGroup(self._sequence, self.now_ns, writer, caused, place, ((other, shown),)))
         if entries is not None and self._watched:
-            self._tell_watchers([(view, element), *(entry[:2] for entry in entries)])
-
-    def _tell_watchers(self, written: Iterable[tuple[int, int]]) -> None:
-        for key in written:
-            for told in self._watched.get(key, ()):
-                told()
+            for key in [(view, element), *(entry[:2] for entry in entries)]:
+                for watcher in self._watched.get(key, ()):
+                    watcher()
 
     def _spread(self, view: int, element: int, value: Value) -> list[tuple[int, int, Value]]:
-        """Return the other changes by a write of a register, except to forced values."""
         changes = self.registers.consequences(view, element, value, self.read_now)
         return [change for change in changes if change[:2] not in self._forced]

@@ -1,8 +1,7 @@
-"""The private image of a module that works on copies of common memory, such as a UDC (S-3006 p. 4-2).
+"""The memory of a UDC's tasks: an image for its application registers, common memory for all others (S-3006 p. 4-2).
 
-``LocalMemory`` is the memory of a UDC's tasks: the image for its application registers, which the UDC copies from and
-to the dual port at its own instants (S-3056 p. 3-50). Tasks access all other registers in the dual port: blocks through
-the latch, BASIC statements at once (S-3006 p. 4-9).
+The UDC copies the image from and to the dual port at its own instants (S-3056 p. 3-50). Other registers are in the dual
+port: blocks access them through the latch, BASIC statements at once (S-3006 p. 4-9).
 """
 
 from __future__ import annotations

@@ -16,8 +16,6 @@ from automax_ros.runtime.time.scheduler import Scheduler
 
 Key = tuple[int, int]
 """View and element."""
-Kept = tuple[int, int, Value, int]
-"""A write that waits: view, element, value, writer."""
 Shape = Callable[[Value], Value]
 """Converts a value from outside to that of a register."""
 
@@ -38,11 +36,7 @@ class Freezer:
 
 
 class ProcessInputs:
-    """Writes of one rack's inputs and other variables from outside its tasks, between scans.
-
-    They go to ``memory``. ``frozen`` has the inputs that are frozen now: check it before calling ``scanned``, which is
-    due after every scan.
-    """
+    """Writes to ``memory`` from outside tasks. While ``frozen`` has inputs, ``scanned`` is called after every scan."""
 
     def __init__(self, memory: CommonMemory, scheduler: Scheduler) -> None:
         """Create it with inputs that are not frozen."""
@@ -68,11 +62,7 @@ class ProcessInputs:
             freezer.kept[key] = value, writer
 
     def write_from_outside(self, view: int, value: Value, writer: int, element: int = 0) -> None:
-        """Write a value as ROS, a preset or an operator gives it.
-
-        Raises:
-            MemoryValueError: the value does not fit the variable's type, or the element does not exist.
-        """
+        """Write a value as ROS, a preset or an operator gives it; raises what ``CommonMemory.accepted`` does."""
         self.write(view, element, self.memory.accepted(view, value, element), writer)
 
     def freeze(self, freezer: Freezer, tasks: Iterable[str]) -> None:
@@ -103,11 +93,7 @@ class ProcessInputs:
         return bool(kept)
 
     def load(self, freezer: Freezer, owed: Iterable[str], kept: Iterable[Sequence[object]]) -> None:
-        """Restore a freezer's state.
-
-        Raises:
-            ValueError: a write that waits is not one to its inputs.
-        """
+        """Restore a freezer's state; ValueError if a write that waits is not one to its inputs."""
         self.freeze(freezer, owed)
         for view, element, value, writer in kept:
             if (view, element) not in freezer.keys or not isinstance(value, int) or not isinstance(writer, int):

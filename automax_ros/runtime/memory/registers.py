@@ -1,8 +1,7 @@
 """Registers of modules in common memory: the effect of a write to one view on others that show the same bits.
 
-A word and its bits alias in actual memory; the latch copies views, so in a scan they are independent (3.3).
-
-``Backplane`` has the registers of each slot. An empty slot or a missing register is bus error 31.
+A word and its bits alias in actual memory; the latch copies views, so in a scan they are independent (3.3). An empty
+slot or a missing register of the ``Backplane`` is bus error 31.
 """
 
 from __future__ import annotations
@@ -22,8 +21,6 @@ Entry = tuple[int, int, Value]
 WORD = 0xFFFF
 """All bits of a register."""
 _TWO_WORDS = (DataType.DOUBLE, DataType.REAL)
-
-
 BUS_ERROR = 7031
 """The run-time error of a register that does not answer (hardware code 31, J-3650 p. 5-3).
 
@@ -54,9 +51,9 @@ class RegisterMap:
         self.views = frozenset({*self._places, *(place.bank for place in self._places.values())})
 
     def consequences(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> Iterator[Entry]:
-        """Yield the other changes by a write of ``value`` to ``view``: words of the bank, then points, by register.
+        """Yield the other changes by a write to ``view``: words of the bank, then points, by register.
 
-        ``read`` returns the value of a view before the write. Values that do not change are not yielded.
+        ``read`` returns the value of a view before the write.
         """
         place = self._places.get(view)
         bank = view if place is None else place.bank
@@ -118,10 +115,14 @@ class RegisterMap:
         return range(first, first + (2 if self._types[view] in _TWO_WORDS else 1))
 
     def _words(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> dict[int, int]:
-        """Return the registers that a write changes, as unsigned 16-bit words."""
+        """Return the registers that a write changes, as unsigned 16-bit words.
+
+        Two registers hold a REAL in IEEE single precision, high word first (decision).
+        """
         assert not isinstance(value, str)
         place, kind = self._places.get(view), self._types[view]
-        number = _real_bits(value) if place is not None and kind is DataType.REAL else int(value)
+        is_real = place is not None and kind is DataType.REAL
+        number = int.from_bytes(struct.pack(">f", value), "big") if is_real else int(value)
         if place is None:
             return {element: number & WORD}
         first = place.register
@@ -133,13 +134,17 @@ class RegisterMap:
         return {first: number & WORD}
 
     def _shown(self, view: int, words: dict[int, int], read: Callable[[int, int], Value]) -> Value:
-        """Return the value of a point from its registers; ``words`` are those that have just changed."""
+        """Return the value of a point from its registers; ``words`` are those that have just changed.
+
+        Bits that are no REAL show as 0 or as its largest (decision).
+        """
         place = self._places[view]
         found = [words.get(number, _unsigned(read(place.bank, number))) for number in self._registers(view)]
         if place.bit is not None:
             return bool(found[0] >> place.bit & 1)
         if self._types[view] is DataType.REAL:
-            return _real_of(found[0] << 16 | found[1])
+            real: float = struct.unpack(">f", (found[0] << 16 | found[1]).to_bytes(4, "big"))[0]
+            return 0.0 if math.isnan(real) else stored_real(real)[0]
         if len(found) == 2:
             return _signed(found[0]) << 16 | found[1]
         return _signed(found[0])
@@ -152,17 +157,6 @@ def _signed(word: int) -> int:
 def _unsigned(value: Value) -> int:
     assert not isinstance(value, str)
     return int(value) & WORD
-
-
-def _real_bits(value: int | float) -> int:
-    """Return a REAL as the 32 bits that two registers hold: IEEE single precision, high word first (decision)."""
-    return int.from_bytes(struct.pack(">f", value), "big")
-
-
-def _real_of(bits: int) -> float:
-    """Return the REAL in two registers; bits that are not one show as 0 or as its largest (decision)."""
-    value: float = struct.unpack(">f", bits.to_bytes(4, "big"))[0]
-    return 0.0 if math.isnan(value) else stored_real(value)[0]
 
 
 @dataclass(frozen=True)

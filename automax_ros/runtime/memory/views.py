@@ -1,8 +1,7 @@
-"""Views of common memory: variables as memory, tasks, recordings and replays use them, and the four operations.
+"""Views of common memory: variables as memory, tasks, recordings and replays use them.
 
-A variable is a view, identified by its index in the rack's table of variables. A plain common has its own cell. The
-registers of a module are one view too, an array of 16-bit words (its bank); an I/O point is a view with a ``Place`` in
-such a bank, so that a word and its bits show the same registers.
+A variable is a view, identified by its index in the rack's table of variables. The registers of a module are one view,
+an array of 16-bit words (its bank); an I/O point is a view with a ``Place`` in it: a word and its bits show the same.
 """
 
 from __future__ import annotations
@@ -22,10 +21,7 @@ from automax_ros.core.types import DataType, Latched, Value
 
 @dataclass(frozen=True)
 class Place:
-    """The place of an I/O point: the view of its module's bank, its (first) register, its bit if it is a BOOLEAN.
-
-    A DOUBLE INTEGER has two registers, the high word first (57C421 p. 4-4).
-    """
+    """An I/O point's bank (a view), first register (of two: high word first, 57C421 p. 4-4), bit if it is a BOOLEAN."""
 
     bank: int
     register: int
@@ -58,10 +54,9 @@ class Write(NamedTuple):
 
 
 class WriteGroup:
-    """Entries of the write log from one operation: the same instant, writer, kind and element.
+    """Entries of the write log from one operation, such as a scan's commit; ``sequence`` is that of the first.
 
-    ``changes`` are (view, value) in order, not to be modified. ``sequence`` is that of the first. A scan's commit is
-    one group, without an object for each value.
+    ``changes`` are (view, value) in order, not to be modified.
     """
 
     __slots__ = ("changes", "element", "kind", "sequence", "time_ns", "writer")
@@ -102,51 +97,33 @@ LatchPlan = Callable[[list[Value]], Latched]
 
 
 class Memory(Protocol):
-    """The memory of a task: the four operations, and which views are held by a force.
+    """The memory of a task: ``CommonMemory`` describes the operations; values are within their view's type already.
 
-    The live memory of a rack, the private image of a module and the memory of a replay implement it. ``now_ns`` is the
-    time of the next access; code that runs tasks sets it.
+    The live memory of a rack, the local memory of a UDC and the memory of a replay implement it. ``now_ns`` is the time
+    of the next access; code that runs tasks sets it.
     """
 
     now_ns: int
 
-    def view(self, name: str) -> int:
-        """Return the view of a variable by its full name; KeyError if there is none."""
-        ...
+    def view(self, name: str) -> int: ...  # noqa: D102
 
-    def plan(self, views: Sequence[int]) -> LatchPlan:
-        """Return the prepared list of simple views that a task latches."""
-        ...
+    def plan(self, views: Sequence[int]) -> LatchPlan: ...  # noqa: D102
 
-    def latch(self, plan: LatchPlan) -> Latched:
-        """Return copies of the planned views, in their order (3.3)."""
-        ...
+    def latch(self, plan: LatchPlan) -> Latched: ...  # noqa: D102
 
-    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
-        """Write the values that a scan's blocks changed, at END: (view, value), already within the view's type."""
-        ...
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None: ...  # noqa: D102
 
-    def read_now(self, view: int, element: int = 0) -> Value:
-        """Return an actual value, for BASIC statements, arrays, REALs and strings."""
-        ...
+    def read_now(self, view: int, element: int = 0) -> Value: ...  # noqa: D102
 
-    def write_now(
+    def write_now(  # noqa: D102
         self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
-    ) -> None:
-        """Write an actual value, already within the view's type."""
-        ...
+    ) -> None: ...
 
-    def is_forced(self, view: int) -> bool:
-        """Return whether a force holds a simple view."""
-        ...
+    def is_forced(self, view: int) -> bool: ...  # noqa: D102
 
-    def under_force(self, view: int) -> Value:
-        """Return the value of a simple view without its force."""
-        ...
+    def under_force(self, view: int) -> Value: ...  # noqa: D102
 
-    def watch_forces(self, changed: Callable[[], None]) -> None:
-        """Call ``changed`` whenever a force begins or ends, between two scans."""
-        ...
+    def watch_forces(self, changed: Callable[[], None]) -> None: ...  # noqa: D102
 
 
 class MemoryValueError(ValueError):
@@ -167,10 +144,9 @@ class CellLatch(partial[Latched]):
 
 
 class CellCommit(NamedTuple):
-    """Allows a commit without a call: native scans store changed values directly in the cells.
+    """Allows a commit without a call: native scans store changed values of ``plain`` views directly in the cells.
 
-    ``plain`` says for each view whether a write changes only its cell. ``gate`` is two integers of 64 bits: 1 while a
-    commit changes only cells, and the number of values stored in this way, which scans count.
+    ``gate`` is two integers of 64 bits: 1 while a commit changes only cells, and the number of values stored so.
     """
 
     cells: list[Value]
@@ -181,23 +157,15 @@ class CellCommit(NamedTuple):
 def latch_plan(views: Sequence[int]) -> LatchPlan:
     """Return the fastest function that picks views from the list of cells."""
     if not views:
-        return _latch_nothing
+        return lambda _: ()
     if len(views) == 1:
         only = views[0]
         return lambda cells: (cells[only],)
     return itemgetter(*views)
 
 
-def _latch_nothing(_: list[Value]) -> Latched:
-    return ()
-
-
 def fitting(spec: ViewSpec, value: Value) -> Value:
-    """Return a value from outside in the variable's type.
-
-    Raises:
-        MemoryValueError: wrong kind of value, or out of the type's range.
-    """
+    """Return a value from outside in the variable's type; MemoryValueError for a wrong kind or one out of range."""
     kind = spec.type
     if kind is DataType.BOOLEAN:
         if isinstance(value, bool) or value in (0, 1):

@@ -65,8 +65,7 @@ class Channels:
     def open_reader(self, number: int, types: str, depth: int, reader: str, now_ns: int) -> int:
         """Make a task the reader; return the problem or 0.
 
-        A task that opens its channel again with the same types and depth keeps its messages; otherwise they are lost
-        (decision).
+        Opened again with the same types and depth, a channel keeps its messages; otherwise they are lost (decision).
         """
         if not 1 <= depth <= MAX_DEPTH:
             return WRONG_DEPTH

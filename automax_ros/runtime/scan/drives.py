@@ -1,7 +1,4 @@
-"""The 57C406 modules of a rack as current minor loop (CML) tasks use them: each interrupts, measures and fires gates.
-
-The module implements ``DrivePort`` and attaches itself; a replay implements it with recorded data.
-"""
+"""The 57C406 modules of a rack as current minor loop (CML) tasks use them: each interrupts, measures, fires gates."""
 
 from __future__ import annotations
 
@@ -16,10 +13,10 @@ NO_LINE = Measured(0)
 
 
 class DrivePort(Protocol):
-    """One 57C406 with the drive that it controls.
+    """One 57C406 with its drive, or a recording of one.
 
-    A task arms it, is called at each interrupt, then reads the measurement and gives the command for the time to the
-    next. Without a command the interrupts continue at their present interval.
+    A task arms it, is called at each interrupt, then reads the measurement and gives the command up to the next one.
+    Without a command the interrupts continue at their present interval.
     """
 
     def initialise(self) -> None:
@@ -93,8 +90,6 @@ class Drives:
 
 
 class _NoModule:
-    """The port of a slot without a 57C406: it neither interrupts nor measures."""
-
     next_ns = None
 
     def initialise(self) -> None:

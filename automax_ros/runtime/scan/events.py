@@ -11,7 +11,7 @@ Wake = Callable[[int], None]
 class Event:
     """One event. A ``set`` before any task waits is kept until one waits, once (decision).
 
-    ``skipped`` is how often it would have been set just before the last time, had the host not been late.
+    ``skipped`` counts the times left out just before the last one because the host was late.
     """
 
     def __init__(self, name: str) -> None:

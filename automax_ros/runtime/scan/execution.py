@@ -14,7 +14,7 @@ Place = Mapping[str, Any]
 
 
 class Job(Protocol):
-    """A unit of work for a Processor: a scan of a task, or what a BASIC task does from one suspension to the next.
+    """A unit of work for a Processor: a scan of a task, or a burst of a BASIC task.
 
     ``priority`` is 4 (first) to 11; ``name``, the task's, is the order among equals.
     """
@@ -55,11 +55,7 @@ class Execution(Protocol):
         return None
 
     def resume(self, job: Job, place: Place, steps: Steps | None) -> None:  # noqa: ARG002
-        """Continue a job from its place; ``steps`` are at this place, None if it had not begun.
-
-        Raises:
-            ValueError: jobs take no time.
-        """
+        """Continue a job from its place, with ``steps`` if it had begun; ValueError if jobs take no time."""
         raise ValueError(f"task {job.name} was in the middle of a scan: the state is that of modeled execution")
 
 

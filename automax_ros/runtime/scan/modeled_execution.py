@@ -91,16 +91,12 @@ class ModeledExecution:
         return None
 
     def _place_of(self, frame: _Frame) -> int:
-        """Return the place of a new job among those that are in progress or wait."""
-        place = 0
-        for other in self._frames:
-            if _goes_before(frame, other):
-                break
+        order, place = _order(frame), 0
+        while place < len(self._frames) and _order(self._frames[place]) <= order:
             place += 1
         return place
 
-    def _book(self, now_ns: int) -> None:
-        """Suspend the job that is being executed: it has used the time up to now."""
+    def _book(self, now_ns: int) -> None:  # the job that is being executed has used the time up to now
         if self._event is not None:
             self._event.cancel()
             self._event = None
@@ -138,26 +134,20 @@ class ModeledExecution:
                 self._wait(now_ns)
 
     def _wait(self, now_ns: int) -> None:
-        """Post the continuation of the first job after its remaining time, unless jobs are being executed now."""
         if self._frames and not self._going:
             self._since_ns = now_ns
             event = self._spare
             self._spare = None
             if event is None:
-                event = ScheduledEvent(self._key, self._goes_on)
+                event = ScheduledEvent(self._key, self._continue)
             self._event = self._scheduler.post(now_ns + self._frames[0].remaining_ns, event)
 
-    def _goes_on(self, now_ns: int, _: int) -> None:
+    def _continue(self, now_ns: int, _: int) -> None:
         self._spare = self._event
         self._event = None
         self._frames[0].remaining_ns = 0
         self._go(now_ns)
 
 
-def _goes_before(new: _Frame, other: _Frame) -> bool:
-    """Return whether a new job is executed before one that is in progress or waits."""
-    if new.job.priority != other.job.priority:
-        return new.job.priority < other.job.priority
-    if new.steps is not None or other.steps is not None:
-        return new.steps is not None
-    return new.job.name < other.job.name
+def _order(frame: _Frame) -> tuple[int, bool, str]:
+    return frame.job.priority, frame.steps is None, frame.job.name

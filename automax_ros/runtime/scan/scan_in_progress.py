@@ -1,8 +1,8 @@
 """A scan in steps of modeled time that has not ended yet: its data, and what is needed to execute it again.
 
-Such a scan works on a copy of its task's state: until it ends, the state of the task is that of its last complete scan.
-Snapshots contain that state, and a scan that is abandoned does not change it (decision: only what it has written to
-memory stays written). The scan notes what it reads, so that another rack can execute its first part again and continue.
+It works on a copy of its task's state, which is that of the last complete scan until it ends, in snapshots too; a scan
+that is abandoned changes only what it has written to memory (decision). It notes what it reads, so that another rack
+can execute its first part again and continue.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ Progress = Mapping[str, Any]
 class ReplayableReads:
     """Memory as a scan in progress uses it: ``noted`` are all values that it has read since it began.
 
-    After ``replay`` it returns the values that an earlier scan read and writes nothing, until ``end_replay``.
-    ``latched`` are the views of a latch.
+    From ``replay`` to ``end_replay`` it returns the values that an earlier scan read, and writes nothing.
     """
 
     def __init__(self, memory: ScanMemory) -> None:

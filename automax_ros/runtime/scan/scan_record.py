@@ -26,8 +26,7 @@ _KEPT = {"commits": "_commits", "errors": "_errors", "reads": "_reads", "writes"
 class ScanRecord:  # noqa: PLW1641  # no hash: it changes during the scan
     """All inputs and effects of one scan; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value).
 
-    ``time_ns`` is the instant of the latch, ``duration_ns`` the time of execution: the host's, or the modeled one from
-    the scan's beginning to its end, including the time in which it was suspended.
+    ``time_ns`` is the instant of the latch, ``duration_ns`` the host's time of execution, or the modeled one.
     """
 
     # Not a dataclass: every recorded scan makes one, and that takes twice as long. Few need any of the lists.

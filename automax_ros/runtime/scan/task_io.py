@@ -32,10 +32,7 @@ def at_once(call: Call) -> Any:
 
 
 class Host(Protocol):
-    """The task of a ``TaskIo``.
-
-    ``plan`` are the views that a scan latches, ``written`` those that its blocks write.
-    """
+    """The task of a ``TaskIo``; ``plan`` are the views that a scan latches, ``written`` those that its blocks write."""
 
     writer: int
     backplane: Backplane
@@ -112,10 +109,7 @@ def _no_loop(inputs: tuple[Any, ...], records: list[Value] | None) -> Sequence[V
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class TaskIo:
-    """Access of a compiled scan to common memory through one task, to its error log and its printed lines.
-
-    Members are bound once, so that a scan costs no more than the memory itself.
-    """
+    """Access of a compiled scan to memory, error log and printed lines; members are bound once, so that it is fast."""
 
     def __init__(self, task: Host, memory: ScanMemory, outcome_of: OutcomeOf = at_once) -> None:
         """Bind a task and the memory that its scans work on."""

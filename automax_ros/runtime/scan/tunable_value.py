@@ -12,9 +12,7 @@ from automax_ros.language.program import Symbol
 def tunable_value(symbol: Symbol, name: str, value: object) -> int | float:
     """Return the value that a tunable would have if it were set to ``value``; ``name`` identifies it in messages.
 
-    Raises:
-        KeyError: it cannot be tuned.
-        ValueError: the value lies outside its limits or is not of its type.
+    Raises KeyError if it cannot be tuned, ValueError if the value is outside its limits or not of its type.
     """
     if symbol.tuning is None:
         raise KeyError(name)

@@ -1,7 +1,7 @@
 """A BASIC task: it runs from one suspension to the next, a burst, and each burst counts as a scan.
 
-Nothing is latched: reads and writes access actual memory at once. What a burst receives from channels and sends is
-among the reads of its record (``CHANNEL_VIEWS``), so that the burst can be executed again.
+Reads and writes access actual memory at once. What a burst receives from channels and sends is among the reads of its
+record (``CHANNEL_VIEWS``), so that the burst can be executed again.
 """
 
 from __future__ import annotations
@@ -41,66 +41,45 @@ class BasicIo(TaskIo):
     def open_reader(self, number: int, types: str, depth: int) -> int:
         """Make the task the reader of a channel; return the problem or 0."""
         name, open_reader, memory = self._basic.name, self._channels.open_reader, self._memory
-        return cast(int, self._outcome_of(lambda: open_reader(number, types, depth, name, memory.now_ns)))
+        return self._noted(number, self._outcome_of(lambda: open_reader(number, types, depth, name, memory.now_ns)))
 
     def open_writer(self, number: int, types: str) -> int:
         """Find a channel; return 0, the problem, or MUST_WAIT while no task reads it."""
-        return cast(int, self._outcome_of(lambda: self._channels.open_writer(number, types)))
+        return self._noted(number, self._outcome_of(lambda: self._channels.open_writer(number, types)))
 
     def receive(self, number: int) -> tuple[Message, int]:
         """Receive the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
         types, name, memory = self._basic.types(number), self._basic.name, self._memory
-        received = self._outcome_of(lambda: self._channels.receive(number, types, name, memory.now_ns))
-        return cast(tuple[Message, int], received)
+        message, outcome = self._outcome_of(lambda: self._channels.receive(number, types, name, memory.now_ns))
+        return message, self._noted(number, outcome, message)
 
     def send(self, number: int, message: Message) -> int:
         """Send a message to a channel; return 0, the problem, or MUST_WAIT if it is full."""
-        types = self._basic.types(number)
-        return cast(int, self._outcome_of(lambda: self._channels.send(number, types, message, self._memory.now_ns)))
+        types, memory = self._basic.types(number), self._memory
+        outcome = self._outcome_of(lambda: self._channels.send(number, types, message, memory.now_ns))
+        return self._noted(number, outcome, () if outcome else message)
+
+    def _noted(self, number: int, outcome: int, items: Message = ()) -> int:  # noqa: ARG002
+        return outcome
 
 
 class RecordingBasicIo(BasicIo, RecordingIo):
-    """The same, with everything noted, the outcomes of channels among the reads."""
+    """The same, with everything noted, the outcomes of channels and the items among the reads."""
 
-    def open_reader(self, number: int, types: str, depth: int) -> int:
-        """Make the task the reader of a channel and note the outcome."""
-        return self._noted(number, super().open_reader(number, types, depth))
-
-    def open_writer(self, number: int, types: str) -> int:
-        """Find a channel and note the outcome."""
-        return self._noted(number, super().open_writer(number, types))
-
-    def receive(self, number: int) -> tuple[Message, int]:
-        """Receive a message and note the outcome and its items."""
-        message, outcome = super().receive(number)
-        self._noted(number, outcome)
-        self._note_items(number, message)
-        return message, outcome
-
-    def send(self, number: int, message: Message) -> int:
-        """Send a message to a channel and note the outcome, and the items that were sent."""
-        outcome = self._noted(number, super().send(number, message))
-        if not outcome:
-            self._note_items(number, message)
-        return outcome
-
-    def _note_items(self, number: int, message: Message) -> None:
-        kinds = self._basic.file(number).types
-        self.record.reads.extend(
-            (CHANNEL_VIEWS[kind], number, item) for kind, item in zip(kinds, message, strict=False)
-        )
-
-    def _noted(self, number: int, outcome: int) -> int:
-        self.record.reads.append((CHANNEL_VIEWS[DataType.INTEGER], number, outcome))
+    def _noted(self, number: int, outcome: int, items: Message = ()) -> int:
+        reads = self.record.reads
+        reads.append((CHANNEL_VIEWS[DataType.INTEGER], number, outcome))
+        if items:
+            kinds = self._basic.file(number).types
+            reads.extend((CHANNEL_VIEWS[kind], number, item) for kind, item in zip(kinds, items, strict=False))
         return outcome
 
 
 class BasicTask(Task):
-    """A BASIC task in a rack: a ``Task`` whose scans are bursts.
+    """A ``Task`` whose scans are bursts.
 
     ``wish`` is what it waits for since the last burst; a timed wait ends at ``wake_ns``, one for an event began there.
-    ``suspended`` is called after each burst, when these are known. ``every`` is period, start and number of the last
-    instant of its START EVERY.
+    ``suspended`` is called then. ``every`` is period, start and number of the last instant of its START EVERY.
     """
 
     wish: Wish
@@ -155,10 +134,7 @@ class BasicTask(Task):
         return now_ns
 
     def run(self, now_ns: int = 0) -> ScanRecord | None:
-        """Put the task into RUN: it starts at its first statement, wherever it stopped (J2-3106-1 p. 12-4).
-
-        Returns an empty record, as scan 0, if bursts are recorded.
-        """
+        """Put the task into RUN, at its first statement (J2-3106-1 p. 12-4); return scan 0, empty, if recorded."""
         self.heed_forces()
         self.compiled.layout.restart(self.state)
         self.status, self.scan_number = Status.RUNNING, 0
@@ -191,11 +167,7 @@ class BasicTask(Task):
         return [*self.wish, self.wake_ns, *(self.every or (0, 0, 0)), self._instant, self._bursts]
 
     def wait_again(self, numbers: Sequence[int]) -> None:
-        """Restore what ``waiting`` returned.
-
-        Raises:
-            ValueError: a BASIC task cannot wait for that.
-        """
+        """Restore what ``waiting`` returned; ValueError if a BASIC task cannot wait for that."""
         if len(numbers) != len(self.waiting()) or not all(isinstance(number, int) for number in numbers):
             raise ValueError(f"task {self.name} cannot wait for {list(numbers)[:9]!r}")
         kind, argument, self.wake_ns, period, begin, count, self._instant, self._bursts = numbers

@@ -1,9 +1,8 @@
 """The task of a DC drive: its scans begin at the interrupts of a 57C406, and its first block is the current minor loop.
 
-The loop (``drive/current_loop``) is a part of the task's state: it gets the measurement of the 57C406 and the latch of
-the task, and returns a command for the 57C406. Measurement and command are noted in the record of a scan
-(``drive_record``), so the scan can be executed again without the drive. The loop's time is that of the latch (decision:
-in modeled execution a scan latches later than its interrupt).
+The loop (``drive/current_loop``) is a part of the task's state. Measurement and command of the 57C406 are noted in the
+record of a scan (``drive_record``), so that it can be executed again without the drive. The loop's time is that of the
+latch (decision: in modeled execution a scan latches later than its interrupt).
 """
 
 from __future__ import annotations
@@ -46,8 +45,6 @@ Sensed = tuple[int, Measured, Sequence[Under]]
 
 
 class _LoopScans:
-    """The minor loop's part of the scans that one ``io`` executes; the record of ``io`` contains all of it."""
-
     def __init__(self, task: CmlTask, io: TaskIo, memory: ScanMemory, outcome_of: OutcomeOf) -> None:
         self._task, self._io, self._memory, self._outcome_of = task, io, memory, outcome_of
         self._recording = io if isinstance(io, RecordingIo) else None
@@ -58,10 +55,7 @@ class _LoopScans:
         io.latch = self._latch_at
 
     def scan(self, inputs: tuple[Any, ...], records: list[Value] | None) -> Sequence[Value] | None:
-        """Execute a scan of the loop; ``records`` is a local DIAG_DATA.
-
-        Returns the outputs without DIAG_DATA in their order, None if none is written.
-        """
+        """Execute a scan of the loop; ``records`` is a local DIAG_DATA. Returns the other outputs, if written."""
         task, recording = self._task, self._recording
         now_ns, measured, under = self._outcome_of(self._sense)
         if type(measured) is not Measured:
@@ -216,11 +210,7 @@ class CmlTask(Task):
         return [*values[:-LOG_NUMBERS], *(_NOTHING if numbers == _FRESH else numbers), *values[-LOG_NUMBERS:]]
 
     def restore(self, values: list[Value]) -> None:
-        """Restore a snapshot.
-
-        Raises:
-            ValueError, OverflowError: it does not fit the layout.
-        """
+        """Restore a snapshot; ValueError or OverflowError if it does not fit the layout."""
         state, log = values[: -LOG_NUMBERS - NUMBERS], values[-LOG_NUMBERS:]
         numbers = values[len(state) : -LOG_NUMBERS]
         before = self.loop.numbers()

@@ -51,10 +51,7 @@ class Interrupts:
         return [task.name for (*_, event), (task, _) in bound if task.status is Status.RUNNING and awaits(task, event)]
 
     def post(self, bank: int, register: int, now_ns: int, skipped: int = 0) -> None:
-        """Set the events of an ISCR, each once, in the order of priority and name of their tasks.
-
-        ``skipped`` interrupts before this one were left out because the host was late.
-        """
+        """Set the events of an ISCR, in the order of their tasks; a late host left out ``skipped`` before it."""
         bound = sorted(self._bound.get((bank, register), {}).items())
         for event in dict.fromkeys(event for _, (_, event) in bound):
             event.set(now_ns, skipped)

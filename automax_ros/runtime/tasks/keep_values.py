@@ -56,10 +56,7 @@ def _fits(field: StateField, part: Sequence[Value], task: Task) -> bool:
 def stepped(task: Task, name: str, steps: int) -> int | float:
     """Return the value of a tunable after ``steps`` of its STEP up, or down if negative, within its limits (2.4.5).
 
-    Steps are added as decimals, as they are written: ten of 0.1 are 1.0.
-
-    Raises:
-        KeyError: the task has no tunable of that name.
+    Steps are added as decimals, as they are written: ten of 0.1 are 1.0. KeyError if the task has no such tunable.
     """
     tuning = task.compiled.program.symbols[name].tuning
     if tuning is None:

@@ -13,10 +13,7 @@ if TYPE_CHECKING:
 
 
 def scan_in_steps(task: Task, now_ns: int, skipped: int, form: ScanSteps | None) -> Steps:
-    """Execute one scan of a task in steps: see ``Task.scan_modeled``.
-
-    It is plain Python, because a compiled generator that is dropped is not closed: the scan would never end.
-    """
+    """Execute a scan: see ``Task.scan_modeled``. Plain Python: a compiled generator that is dropped is not closed."""
     if task.status is not Status.RUNNING:
         return None
     scan, record, steps = task.begin_steps(now_ns, skipped, form)

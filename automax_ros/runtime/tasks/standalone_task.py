@@ -22,10 +22,7 @@ _TASK, _OUTSIDE = 1, 2
 
 @dataclass(frozen=True)
 class LoneVariable:
-    """One value of a lone task: a simple variable or an array's element, with functions that read and write it.
-
-    ``write`` accepts a value of the variable's type and raises ValueError if the variable cannot hold it.
-    """
+    """A simple variable or an array's element of a lone task; ``write`` raises ValueError if it does not fit."""
 
     label: str
     symbol: Symbol
@@ -49,11 +46,7 @@ class StandaloneTask:
         return [self._variable(Element(item)) for item in self.program.symbols.values() if not item.dimensions]
 
     def variable(self, text: str) -> LoneVariable:
-        """Return the value that a text such as ``REF%`` or ``TABLE%(3)`` names; case and blanks do not matter.
-
-        Raises:
-            NameFault: the task has no such variable or element.
-        """
+        """Return the value that a text such as ``REF%`` or ``TABLE%(3)`` names; NameFault if the task has none."""
         return self._variable(element(text, self.program.symbols, "the task has no variable"))
 
     def _variable(self, meant: Element[Symbol]) -> LoneVariable:

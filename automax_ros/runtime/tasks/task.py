@@ -38,10 +38,7 @@ _RUNNING: Final = Status.RUNNING
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Task:
-    """One task in one rack: its compiled functions, its state, and its place in the rack.
-
-    ``writer`` is its id in the write log. Nothing is executed before ``run``.
-    """
+    """A task in a rack: compiled functions and state. ``writer`` is its id in the write log; ``run`` starts it."""
 
     def __init__(
         self,
@@ -105,10 +102,9 @@ class Task:
 
     @property
     def state(self) -> StateValues:
-        """The state, field by field as in ``compiled.layout``.
+        """The state, field by field as in ``compiled.layout``; get it again after each scan.
 
-        Get it again after each scan: an earlier list is out of date. While a modeled scan is in progress it is the
-        state after the scan before.
+        While a modeled scan is in progress it is the state after the scan before.
         """
         self._put_down()
         return self._state
@@ -120,10 +116,7 @@ class Task:
         self._bind()
 
     def run(self, now_ns: int = 0) -> ScanRecord | None:
-        """Put the task into RUN: blocks start again, the statements before SCAN_LOOP execute once.
-
-        Returns the record of that part, as scan 0, if scans are recorded.
-        """
+        """Put the task into RUN: blocks start again, the part before SCAN_LOOP executes. Returns scan 0, if kept."""
         self.heed_forces()
         self.compiled.layout.restart(self.state)
         self.status, self.scan_number = Status.RUNNING, 0
@@ -217,9 +210,9 @@ class Task:
             self._over(outcome, scan.began_ns)
 
     def give_up_steps(self) -> None:
-        """Restore the task to its state before the scan in progress.
+        """Restore the task to its state before the scan in progress, without forces that wait.
 
-        Waiting forces are not applied: the garbage collector may abandon a scan at any point of the program.
+        The garbage collector may abandon a scan at any point of the program.
         """
         scan, self._under_way = self._under_way, None
         self.errors = ErrorLog() if scan is None or scan.log is None else scan.log
@@ -259,10 +252,7 @@ class Task:
             scan.own_errors.add(entry)
 
     def clear_errors(self, *, inside: bool = False) -> None:
-        """Clear the error log, from ``inside`` a scan or as the operator does.
-
-        If the operator clears it, errors that a scan in progress has logged itself remain (decision).
-        """
+        """Clear the error log; if the operator does, what a scan in progress has logged remains (decision)."""
         scan = self._under_way
         if scan is None or inside:
             self.errors.clear()
@@ -278,21 +268,13 @@ class Task:
         return [*self.compiled.layout.flatten(self.state), *errors.flatten()]
 
     def restore(self, values: list[Value]) -> None:
-        """Restore a snapshot.
-
-        Raises:
-            ValueError: it does not fit the layout.
-        """
+        """Restore a snapshot; ValueError if it does not fit the layout."""
         restored = self.compiled.layout.restore(values[:-LOG_NUMBERS])
         self.errors.restore([int(number) for number in values[-LOG_NUMBERS:]])
         self.state[:] = restored
 
     def value(self, name: str) -> Value | list[Value]:
-        """Return a local, a tunable or a block's state by its name in the layout.
-
-        Raises:
-            KeyError: the layout has no such field.
-        """
+        """Return a local, a tunable or a block's state by its name in the layout; KeyError if it has none."""
         return self.state[self.compiled.layout.index(name)]
 
     def tune(self, name: str, value: object) -> None:
@@ -303,19 +285,13 @@ class Task:
             self._under_way.state[position] = fitting
 
     def tuning(self, name: str, value: object) -> int | float:
-        """Return the value that a tunable would have if it were set to ``value``; nothing is set.
-
-        Raises:
-            KeyError: the task has no tunable of that name.
-            ValueError: the value lies outside its limits or is not of its type.
-        """
+        """Return the value that a tunable would have if it were set (``tunable_value``, with its errors)."""
         return tunable_value(self.compiled.program.symbols[name], name, value)
 
     def hold(self, forces: Mapping[str, Value]) -> None:
-        """Hold these simple locals, and no others, at values of their types against every write of the task.
+        """Hold these simple locals, and no others, at values of their types; ``held`` has those in effect.
 
-        A modeled scan in progress ends first, as it began (decision). ``forces`` has the requested values, ``held``
-        those in effect.
+        A modeled scan in progress ends first, as it began (decision).
         """
         self.forces = dict(forces)
         self._forces_wait = True
@@ -375,7 +351,6 @@ class Task:
         return self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
 
     def _over(self, outcome: Any, began_ns: int) -> None:  # noqa: ARG002
-        """End a scan with the result of its compiled form, if that is not FALSE: TRUE if the task executed STOP."""
         self.status = Status.ENDED
 
     def _bind(self) -> None:

@@ -1,14 +1,13 @@
 """A pacer that follows the clock of another program, message by message: a simulator's, or a recording's.
 
-Rack time 0 is the first time received. For each later one every event up to and at it is executed at its own instant:
-none is skipped, and the wall clock is not used, so the same sequence of times and writes gives the same scans. Writes
-from outside take effect at the last time received.
+Rack time 0 is the first time received. For each later one every event up to it is executed at its own instant: none is
+skipped, and the same sequence of times and writes gives the same scans. Writes from outside take effect at the last
+time received. A time of 0 is ignored, as everywhere in ROS.
 
-A rack cannot go back. If the clock does (a recording that begins again, a simulator that is reset), rack time continues
-from where it is, and so do stamps, which are ahead of the clock from then on (decision: a recording's messages stay
-in order; who wants a fresh run starts the rack again). If the clock goes ahead by more than ``LONGEST_JUMP_NS`` at
-once, the time between is left out, and stamps are the clock's (decision: a clock that begins at 0 and then tells the
-time of day would have the rack scan for 50 years). Both are reported. A time of 0 is ignored, as everywhere in ROS.
+If the clock goes back, rack time and stamps continue from where they are (decision: a recording's messages stay in
+order; for a fresh run the rack is started again). If it goes ahead by more than ``LONGEST_JUMP_NS`` at once, the time
+between is left out (decision: a clock that begins at 0 and then shows the time of day would have the rack scan for 50
+years). Both are reported.
 """
 
 from __future__ import annotations

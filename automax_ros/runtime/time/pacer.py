@@ -1,19 +1,9 @@
 """The pacer: makes a scheduler's time follow the wall clock; the one place below ROS that reads a clock.
 
-::
-
-    rack.start()
-    Pacer(rack.scheduler).run(10 * NS_PER_S)      # ten seconds of the wall clock
-
-Every event has an absolute deadline. A periodic one that the loop misses because of the host is skipped and counted,
-and the next stays on the grid (``Scheduler.run_due``); a drive's interrupts are all executed, late ones in order. The
-caller decides how the time to the next deadline is spent. Actions of other threads fall between two events: they hold
-the same lock as ``turn``.
-
-``halt`` stops time until ``resume``; no event is late or skipped because of it. A program that steps a halted rack
-advances the scheduler's time itself.
-
-``Pace`` is the protocol of all pacers: on the wall clock, simulated, or after the clock of another program.
+A periodic event that the loop misses because of the host is skipped and counted, and the next stays on the grid
+(``Scheduler.run_due``); a drive's interrupts are all executed, late ones in order. Actions of other threads fall
+between two events: they hold the same lock as ``turn``. ``halt`` stops time until ``resume``; no event is late because
+of it. A program that steps a halted rack advances the scheduler's time itself.
 """
 
 from __future__ import annotations
@@ -118,7 +108,6 @@ class SteppedPacer(Pace):
                 next_breath = self._clock() + BREATH_PERIOD_NS
 
     def _advance(self, target_ns: int) -> bool:
-        """Execute all events up to and at an instant, at most those before the end of ``run``: return FALSE then."""
         if self._until_ns is not None and target_ns >= self._until_ns:
             self._scheduler.run_until(self._until_ns)
             return False
@@ -140,10 +129,7 @@ class Pacer:
         wait: Wait = WALL_WAIT,
         turn: Turn | None = None,
     ) -> None:
-        """Create it for a scheduler, whose time passes from ``begin`` on by ``clock`` (ns, monotonic).
-
-        ``turn`` is held, again and again, while ``run`` executes events or calls ``on_idle``.
-        """
+        """Create it; time passes from ``begin`` on by ``clock`` (ns, monotonic). ``run`` holds ``turn`` as it acts."""
         self._scheduler, self._clock, self._wait = scheduler, clock, wait
         self._turn: Turn = nullcontext() if turn is None else turn
         self._zero_ns: int | None = None
@@ -178,10 +164,7 @@ class Pacer:
         return self._clock() - self._zero_ns
 
     def catch_up(self) -> None:
-        """Advance the scheduler's time to the present, before an action from outside; no event is executed.
-
-        Before ``begin`` no time passes.
-        """
+        """Advance the scheduler's time to the present, if it has begun, before an action from outside."""
         if self._zero_ns is not None:
             self._scheduler.pass_until(self.now_ns)
 
@@ -196,10 +179,7 @@ class Pacer:
         on_idle: Callable[[int], None] | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Keep pace until the scheduler's time is ``until_ns`` (events due then are left), or until asked to stop.
-
-        ``on_idle`` gets the time, about every 100 ms, if there is time before the next event.
-        """
+        """Keep pace (``Pace.run``); ``on_idle`` is called if there is time before the next event."""
         next_chore = self._clock() + max(0, -self.now_ns)
         while not should_stop():
             now = self.now_ns

@@ -1,8 +1,7 @@
 """The scheduler: an event queue in integer nanoseconds; only the scheduler has the time.
 
-Events are ordered by (time, class, priority, name), so their order is deterministic. ``run_until`` is simulated time:
-every event at its own instant. ``run_due`` is for the wall clock: the pacer calls it with the time, periodic events
-whose instants have passed are skipped and counted, and the next one stays on the grid.
+Events are ordered by (time, class, priority, name): their order is deterministic. ``run_until`` is simulated time,
+``run_due`` the wall clock's.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ PeriodicAction = Callable[[int, int], None]
 class EventClass(enum.IntEnum):
     """The order at one instant: writes from outside, start of tasks, I/O, execution, scans, observers.
 
-    EXECUTE is a job that a Processor continues in modeled time: a scan that ends when the next is due has ended.
+    EXECUTE continues a scan in modeled time: one that ends when the next is due has ended.
     """
 
     OUTSIDE = 0
@@ -55,6 +54,12 @@ class ScheduledEvent:
         self.cancelled = True
 
 
+def _nothing(now_ns: int, skipped: int) -> None:
+    """Do nothing."""
+
+
+NO_EVENT = ScheduledEvent(EventKey(EventClass.OBSERVE, 0, ""), _nothing, cancelled=True)
+"""What is never posted: the event of those that have none."""
 _Queued = tuple[int, int, int, str, int, ScheduledEvent]
 """Instant, class, priority, name, serial number: a tuple, since tuples compare fast."""
 
@@ -76,11 +81,7 @@ class Scheduler:
         self.zero_ns: int | None = None
 
     def at(self, time_ns: int, key: EventKey, action: Action) -> ScheduledEvent:
-        """Post an event that is executed once.
-
-        Raises:
-            ValueError: the instant lies in the past.
-        """
+        """Post an event that is executed once; ValueError if the instant lies in the past."""
 
         def once(now_ns: int, _: int) -> None:
             action(now_ns)
@@ -88,21 +89,13 @@ class Scheduler:
         return self.post(time_ns, ScheduledEvent(key, once))
 
     def every(self, period_ns: int, first_ns: int, key: EventKey, action: PeriodicAction) -> ScheduledEvent:
-        """Post an event at ``first_ns`` and each ``period_ns`` after it.
-
-        Raises:
-            ValueError: the first instant lies in the past, or the period is not positive.
-        """
+        """Post an event at ``first_ns`` and each ``period_ns`` after it; ValueError for a period of 0 or the past."""
         if period_ns <= 0:
             raise ValueError(f"a period of {period_ns} ns is not positive")
         return self.post(first_ns, ScheduledEvent(key, action, period_ns))
 
     def post(self, time_ns: int, event: ScheduledEvent) -> ScheduledEvent:
-        """Post an event that is not in the queue, and return it.
-
-        Raises:
-            ValueError: the instant lies in the past.
-        """
+        """Post an event that is not in the queue, and return it; ValueError if the instant lies in the past."""
         if time_ns < self.now_ns:
             raise ValueError(f"an event at {time_ns} ns lies before the present, {self.now_ns} ns")
         self._serial += 1
@@ -117,15 +110,15 @@ class Scheduler:
             heapq.heappop(self._queue)
         return self._queue[0][0] if self._queue else None
 
-    def due_ns(self, event: ScheduledEvent | None) -> int | None:
+    def due_ns(self, event: ScheduledEvent) -> int | None:
         """Return the next instant of an event, None if it has none any more."""
         found = (entry[0] for entry in self._queue if entry[5] is event)
-        return None if event is None or event.cancelled else next(found, None)
+        return None if event.cancelled else next(found, None)
 
     def advance_to(self, time_ns: int, key: EventKey) -> bool:
-        """Advance to ``time_ns`` if no event precedes one of that instant and key, and the present run reaches it.
+        """Advance to ``time_ns`` if the present run reaches it and no event precedes one of that instant and key.
 
-        For an action that continues at a later instant: faster than another event.
+        It is faster than another event.
         """
         if time_ns >= self._end_ns:
             return False
@@ -179,8 +172,7 @@ class Scheduler:
     def run_due(self, now_ns: int) -> None:
         """Execute, in order, the events due at a time of the wall clock, and those posted meanwhile up to that time.
 
-        A periodic event that is late by whole periods is executed once, at the last of its instants that have passed;
-        the others are skipped and counted.
+        A periodic event that is late by whole periods is executed once, at its last instant; the others are skipped.
         """
         queue = self._queue
         self._end_ns, self.wall_ns = now_ns + 1, now_ns
@@ -212,10 +204,7 @@ class Scheduler:
         return skipped
 
     def pass_until(self, now_ns: int) -> None:
-        """Advance to a time of the wall clock, at most to the next event, which is not executed yet.
-
-        Called before an action from outside, so that it occurs at the present and still before due events.
-        """
+        """Advance to a time of the wall clock, before an action from outside, at most to the next event."""
         due = self.next_ns
         self.now_ns = max(self.now_ns, now_ns if due is None else min(now_ns, due))
 

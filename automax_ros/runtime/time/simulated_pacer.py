@@ -1,7 +1,4 @@
-"""Simulated time that others can follow: every event at its own instant, none skipped, and a clock that is published.
-
-It runs as fast as the machine can, or at ``rate`` times the wall clock. Actions from outside fall between two instants.
-"""
+"""Simulated time that others can follow: every event at its own instant, none skipped, and a published clock."""
 
 from __future__ import annotations
 
@@ -40,7 +37,7 @@ class SimulatedPacer(SteppedPacer):
         wait: Wait = WALL_WAIT,
         turn: Turn | None = None,
     ) -> None:
-        """Create it; ``tell`` is called with the time once all events up to and at it are executed.
+        """Create it; ``tell`` gets the time once all events up to and at it are executed.
 
         Time passes at ``rate`` times that of ``clock`` (the wall clock, ns), as fast as possible if None.
         """
@@ -84,7 +81,6 @@ class SimulatedPacer(SteppedPacer):
             self._publish(now_ns)
 
     def _target_ns(self) -> int:
-        """Return the next instant at which an event is due, or the clock must be published."""
         tick = self._scheduler.now_ns if self._published_ns is None else self._published_ns + MOST_TICK_NS
         due = self._scheduler.next_ns
         return max(self._scheduler.now_ns, tick if due is None else min(tick, due))
