@@ -1,11 +1,45 @@
-"""What the tests of rack files share."""
+"""What the tests of racks and of their files share."""
 
 from pathlib import Path
+from typing import Any
 
+from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import LoadResult, load
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
 
 HEAD = "rack: LINE1\nslots:\n  0: {module: 57C435, tasks: {LINE: {priority: 5}}}\n"
+
+
+def config_at(path: Path) -> RackConfig:
+    """Return a rack file that is sound."""
+    found = load(path)
+    assert found.config is not None, found.diagnostics
+    return found.config
+
+
+def rack_at(path: Path, **options: Any) -> Rack:
+    """Return the rack of a file, not started."""
+    return Rack(config_at(path), **options)
+
+
+def run_for(rack: Rack, seconds: float = 0.0) -> Rack:
+    """Start a rack, let it run for some seconds and return it."""
+    rack.start()
+    if seconds:
+        rack.run(seconds)
+    return rack
+
+
+class Observer:
+    """An observer of a rack for which nothing that happens matters; others derive from it."""
+
+    def scanned(self, *_: Any) -> None: ...
+
+    def written(self, *_: Any) -> None: ...
+
+    def tuned(self, *_: Any) -> None: ...
+
+    def operated(self, *_: Any) -> None: ...
 
 
 def write(folder: Path, text: str) -> Path:

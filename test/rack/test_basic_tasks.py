@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
+from rack.helpers import rack_at, run_for
 
 TICK = 5_500_000
 COUNT = "10 COMMON N%\n20 START EVERY 2 TICKS\n30 N% = N% + 1\n40 END\n"
@@ -73,9 +73,7 @@ def rack_of(tmp_path, tasks: dict[str, tuple[int, str]], *, execution: str = "id
         commons += "  ISCR%: {slot: 6, register: 3}\n"
     text = f"rack: R\nexecution: {execution}\nslots:\n  0: {{module: 57C413}}\n{slots}common:\n{commons}"
     (tmp_path / "rack.yaml").write_text(text)
-    result = load(tmp_path / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    rack = Rack(result.config)
+    rack = rack_at(tmp_path / "rack.yaml")
     rack.memory.keep_log()
     return rack
 
@@ -85,8 +83,7 @@ def run_ticks(rack: Rack, ticks: int) -> None:
 
 
 def test_start_every_keeps_its_grid(tmp_path):
-    rack = rack_of(tmp_path, {"COUNT": (1, COUNT)})
-    rack.start()
+    rack = run_for(rack_of(tmp_path, {"COUNT": (1, COUNT)}))
     run_ticks(rack, 11)
     writes = [(write.time_ns, write.value) for write in rack.memory.drain() if write.view == rack.memory.view("N%")]
     assert writes == [(2 * number * TICK, number + 1) for number in range(6)]
@@ -94,8 +91,7 @@ def test_start_every_keeps_its_grid(tmp_path):
 
 def test_an_event_set_before_anybody_waits_is_kept_once(tmp_path):
     """Set in scans 3 and 4, while the waiter delays 6 ticks: it goes on once, at its first WAIT."""
-    rack = rack_of(tmp_path, {"SETTER": (1, SETTER), "WAITER": (2, WAITER)})
-    rack.start()
+    rack = run_for(rack_of(tmp_path, {"SETTER": (1, SETTER), "WAITER": (2, WAITER)}))
     run_ticks(rack, 20)
     assert rack.value("M%") == 1
     assert rack.value("SEEN%", 0) == 7
@@ -103,8 +99,7 @@ def test_an_event_set_before_anybody_waits_is_kept_once(tmp_path):
 
 @pytest.mark.parametrize("slots", [(1, 2), (1, 1), (2, 1)])
 def test_a_channel_joins_tasks_of_any_processors(tmp_path, slots):
-    rack = rack_of(tmp_path, {"SENDER": (slots[0], SENDER), "RECEIVER": (slots[1], RECEIVER)})
-    rack.start()
+    rack = run_for(rack_of(tmp_path, {"SENDER": (slots[0], SENDER), "RECEIVER": (slots[1], RECEIVER)}))
     run_ticks(rack, 8)
     # The receiver sleeps from the fifth message on: three more find room, the fourth waits.
     assert (rack.value("GOT%"), rack.value("SENT%")) == (15, 8)
@@ -117,8 +112,7 @@ def test_a_channel_joins_tasks_of_any_processors(tmp_path, slots):
 
 
 def test_run_begins_at_the_first_statement(tmp_path):
-    rack = rack_of(tmp_path, {"COUNT": (1, COUNT)})
-    rack.start()
+    rack = run_for(rack_of(tmp_path, {"COUNT": (1, COUNT)}))
     run_ticks(rack, 5)
     rack.operations.stop("COUNT")
     run_ticks(rack, 5)
@@ -130,8 +124,7 @@ def test_run_begins_at_the_first_statement(tmp_path):
 
 
 def test_stop_all_forgets_events_and_channels(tmp_path):
-    rack = rack_of(tmp_path, {"SENDER": (1, SENDER), "RECEIVER": (2, RECEIVER), "SETTER": (1, SETTER)})
-    rack.start()
+    rack = run_for(rack_of(tmp_path, {"SENDER": (1, SENDER), "RECEIVER": (2, RECEIVER), "SETTER": (1, SETTER)}))
     run_ticks(rack, 8)
     assert rack.events.pending == ("GO_ON",)
     assert rack.channels.state()
@@ -148,8 +141,7 @@ def test_a_reload_of_another_kind_of_task_is_refused(tmp_path):
     from automax_ros.core.diagnostics import SourceText
     from automax_ros.rack.tasks.installation import RackError
 
-    rack = rack_of(tmp_path, {"COUNT": (1, COUNT)})
-    rack.start()
+    rack = run_for(rack_of(tmp_path, {"COUNT": (1, COUNT)}))
     with pytest.raises(RackError, match="is a BASIC task"):
         rack.operations.reload("COUNT", SourceText("COUNT.BLK", "10 CALL SCAN_LOOP(TICKS=4)\n20 END\n"))
     rack.operations.reload("COUNT", SourceText("COUNT.BAS", COUNT.replace("+ 1", "+ 10")))
@@ -170,11 +162,9 @@ def test_a_state_taken_at_any_instant_goes_on_the_same(tmp_path_factory, executi
         "COUNT": (1, COUNT),
     }
     folder = tmp_path_factory.mktemp("rack")
-    whole = rack_of(folder, tasks, execution=execution)
-    whole.start()
+    whole = run_for(rack_of(folder, tasks, execution=execution))
     whole.scheduler.run_until(60 * TICK)
-    rack = rack_of(folder, tasks, execution=execution)
-    rack.start()
+    rack = run_for(rack_of(folder, tasks, execution=execution))
     log = rack.memory.drain()
     for ticks, ns in pauses:
         rack.scheduler.run_until(max(rack.now_ns, rack.now_ns // TICK * TICK + ticks * TICK + ns))
@@ -244,8 +234,7 @@ def test_a_hardware_event_must_come_within_its_time_out(tmp_path, execution):
 def test_a_loop_without_end_leaves_the_processor_to_others(tmp_path):
     busy = "10 LOCAL A%\n20 COMMON M%\n30 A% = 1 - A%\n35 M% = A%\n40 GOTO 30\n50 END\n"
     for execution in ("ideal", "modeled"):
-        rack = rack_of(tmp_path, {"SETTER": (1, SETTER), "BUSY": (1, busy)}, execution=execution)
-        rack.start()
+        rack = run_for(rack_of(tmp_path, {"SETTER": (1, SETTER), "BUSY": (1, busy)}, execution=execution))
         run_ticks(rack, 20)
         assert rack.value("TICKS%") in (19, 20)
         assert rack.stop_reason is None
@@ -255,7 +244,6 @@ def test_tasks_that_wake_each_other_do_not_stop_time(tmp_path):
     events = "10 EVENT NAME = A \\ EVENT NAME = B\n"
     ping = f"{events}20 COMMON N%\n30 WAIT ON A\n40 N% = N% + 1\n50 SET B\n60 GOTO 30\n70 END\n"
     pong = f"{events}20 SET A\n30 WAIT ON B\n40 GOTO 20\n50 END\n"
-    rack = rack_of(tmp_path, {"PING": (1, ping), "PONG": (1, pong)})
-    rack.start()
+    rack = run_for(rack_of(tmp_path, {"PING": (1, ping), "PONG": (1, pong)}))
     run_ticks(rack, 3)
     assert 100 < rack.value("N%") < 400

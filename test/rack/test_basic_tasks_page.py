@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import rack_at
 
 PAGE = Path(__file__).parents[2] / "docs" / "basic_tasks.md"
 FILES = re.findall(
@@ -30,9 +29,7 @@ def test_the_example_reports_each_fifth_kilometre(tmp_path):
     for name, text in FILES:
         (tmp_path / name).write_text(text)
     (tmp_path / "rack.yaml").write_text(RACK)
-    result = load(tmp_path / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    rack = Rack(result.config)
+    rack = rack_at(tmp_path / "rack.yaml")
     assert rack.warnings == []
     rack.start()
     for speed in (40, 70, 55):

@@ -8,8 +8,7 @@ import pytest
 
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
-from rack.helpers import good
+from rack.helpers import config_at, good, rack_at
 
 RACK = """\
 rack: LINE1
@@ -104,7 +103,7 @@ def test_what_breaks_stops_the_drive(tmp_path, verb, value, output):
 def test_a_rack_that_is_cut_goes_on_bit_for_bit(tmp_path, cut_us):
     """Before lock, in the contactor's closing, in the first pulses, in run, at an interrupt, after something broke."""
     whole = rack_of(tmp_path)
-    later = Rack(load(tmp_path / "rack.yaml").config)
+    later = rack_at(tmp_path / "rack.yaml")
     racks, now_us = [whole], 0
     whole.start()
     moves = {600_000: "run", 1_100_000: "open_gate", 1_200_000: "line_sag"}
@@ -163,8 +162,7 @@ def test_two_drives_pull_on_one_web(tmp_path):
     (tmp_path / "LINE.BLK").write_text(PART.format(drive="A", slot=7, digital=8))
     (tmp_path / "DRAW.BLK").write_text(PART.format(drive="B", slot=9, digital=10))
     (tmp_path / "rack.yaml").write_text(TWO)
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
+    config = config_at(tmp_path / "rack.yaml")
     rack = started(Rack(config))
     rack.run(0.4)
     assert (rack.value("STATE_A@"), rack.value("STATE_B@")) == (True, True)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
+from rack.helpers import Observer, rack_at, run_for
 
 MS = 1_000_000
 COMMON = """\
@@ -47,19 +47,22 @@ def built(
     listed = ", ".join(f"{name}: {{priority: {priority}}}" for name, (priority, _) in tasks.items())
     head = f"rack: PM1\nexecution: {execution}\nslots:\n  0: {{module: 57C435, tasks: {{{listed}}}}}\n"
     (folder / "rack.yaml").write_text(f"{head}{slots}common:\n{common}")
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_at(folder / "rack.yaml")
 
 
-class Watching:
+class Watching(Observer):
     """Notes when tasks scan, and what was written by whom."""
 
     def __init__(self, rack: Rack) -> None:
         self.scans: list[tuple[str, int]] = []
         self.writes: list[tuple[int, str, object]] = []
         self._specs = rack.memory.specs
+        self._rack = rack
         rack.observe(self)
+
+    def start(self) -> Watching:
+        self._rack.start()
+        return self
 
     def scanned(self, task, record, writes) -> None:
         if record.scan:
@@ -70,10 +73,6 @@ class Watching:
         entries = (item for group in writes for item in group.entries())
         self.writes += [(item.time_ns, self._specs[item.view].name, item.value) for item in entries]
 
-    def tuned(self, task, now_ns) -> None: ...
-
-    def operated(self, operation) -> None: ...
-
 
 def later(rack: Rack, time_ns: int, action) -> None:
     """Let something come from outside at an instant, before all else of it."""
@@ -82,8 +81,7 @@ def later(rack: Rack, time_ns: int, action) -> None:
 
 def test_interrupts_start_scans_at_whole_periods_after_the_clock(tmp_path):
     rack = built(tmp_path, FOLLOW=(5, FOLLOW))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     rack.run(0.1)
     assert seen.scans == [("FOLLOW", number * 22 * MS) for number in range(1, 5)]
     assert rack.value("COPY%") == rack.value("ISCR%") == 64
@@ -98,8 +96,7 @@ def test_interrupts_start_scans_at_whole_periods_after_the_clock(tmp_path):
 @pytest.mark.parametrize("number", [0, 1, 10, 32767, -32768, -1])
 def test_the_period_register_counts_half_milliseconds_without_sign(tmp_path, number):
     rack = built(tmp_path, FOLLOW=(5, FOLLOW.replace("PERIOD% = 43", f"PERIOD% = {number}")))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     period = ((number & 0xFFFF) + 1) * 500_000
     rack.run(2.5 * period / 1e9)
     assert seen.scans == [("FOLLOW", period), ("FOLLOW", 2 * period)]
@@ -107,8 +104,7 @@ def test_the_period_register_counts_half_milliseconds_without_sign(tmp_path, num
 
 def test_without_a_clock_nothing_interrupts(tmp_path):
     rack = built(tmp_path, FOLLOW=(5, FOLLOW.replace("40 ISCR% = 64\n", "")))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     rack.run(1.0)
     assert seen.scans == []
     rack.write("ISCR%", 64)
@@ -121,8 +117,7 @@ def test_without_a_clock_nothing_interrupts(tmp_path):
 
 def test_a_late_host_skips_whole_interrupts_and_counts_them(tmp_path):
     rack = built(tmp_path, FOLLOW=(5, FOLLOW))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     for now_ms in (1, 22, 23, 100, 101, 110):
         rack.scheduler.run_due(now_ms * MS)
     assert seen.scans == [("FOLLOW", number * 22 * MS) for number in (1, 4, 5)]
@@ -133,8 +128,7 @@ def test_another_module_may_drive_the_clock_but_not_both(tmp_path):
     common = COMMON + "  OTHER%: {slot: 7, register: 2, ros: in}\n"
     slots = "  6: {module: 57C411}\n  7: {module: 57C419}\n"
     rack = built(tmp_path, common, slots, FOLLOW=(5, FOLLOW.replace("ISCR% = 64", "ISCR% = 0")))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     rack.write("OTHER%", 64)
     rack.run(0.03)
     assert seen.scans == [("FOLLOW", 22 * MS)]
@@ -151,8 +145,7 @@ def test_another_module_may_drive_the_clock_but_not_both(tmp_path):
 @pytest.mark.parametrize("registers", [(5,), (6,), (5, 6)])
 def test_an_analog_module_shows_that_there_is_a_clock(tmp_path, registers):
     common = "  STATUS%: {slot: 6, register: 4}\n"
-    rack = built(tmp_path, common, "  6: {module: 57C409}\n", T=(5, "10 CALL SCAN_LOOP(TICKS=1)\n20 END\n"))
-    rack.start()
+    rack = run_for(built(tmp_path, common, "  6: {module: 57C409}\n", T=(5, "10 CALL SCAN_LOOP(TICKS=1)\n20 END\n")))
     view = rack.memory.view("SLOT:6%")
     rack.write_view(view, [(number, 64) for number in registers], 1)
     rack.run(0.001)
@@ -170,8 +163,7 @@ def test_each_channel_of_an_analog_module_has_its_own_interrupt(tmp_path):
     task += "35 ISCR{n}% = 64\n40 CALL SCAN_LOOP(TICKS=1, EVENT=GO{n})\n50 END\n"
     tasks = {"B": (5, task.format(n=0, p=10)), "A": (5, task.format(n=1, p=21))}
     rack = built(tmp_path, common, "  6: {module: 57C409}\n", **tasks)
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     rack.run(0.0225)
     assert seen.scans == [
         ("B", 5_500_000),
@@ -191,8 +183,7 @@ def test_scans_of_one_instant_come_by_priority_and_name_whatever_the_slots(tmp_p
     tasks = {"LAST": (9, task.format(n=5)), "B": (5, task.format(n=6)), "A": (5, task.format(n=7))}
     tasks["CLOCK"] = (4, "10 COMMON I6%\n20 I6% = 64\n30 CALL SCAN_LOOP(TICKS=1)\n40 END\n")
     rack = built(tmp_path, common, slots, **tasks)
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     rack.run(0.012)
     order = [name for name, time_ns in seen.scans if time_ns == 5_500_000]
     assert order == ["CLOCK", "A", "B", "LAST"]
@@ -215,8 +206,7 @@ def test_a_pulsetach_needs_its_timer_enabled_and_counts_24_bits(tmp_path):
 70 END
 """
     rack = built(tmp_path, common, "  6: {module: 57C421}\n", T=(5, task))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     rack.run(0.02)
     assert seen.scans == []
     rack.write("ISCR%", 64 | 32)
@@ -233,8 +223,7 @@ def test_a_pulsetach_needs_its_timer_enabled_and_counts_24_bits(tmp_path):
 def test_inputs_freeze_from_the_interrupt_to_the_end_of_the_scan(tmp_path):
     """A task of higher priority holds the Processor for several ms; the process moves the input meanwhile."""
     rack = built(tmp_path, execution="modeled", HOG=(4, HOG), FOLLOW=(5, FOLLOW))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     later(rack, 21_900_000, lambda: rack.write("POSITION%", 1))
     begins: list[int] = []
     rack.run(0.022)
@@ -260,8 +249,7 @@ def test_inputs_freeze_from_the_interrupt_to_the_end_of_the_scan(tmp_path):
 
 def test_a_frozen_word_and_its_bits_keep_the_order_of_writes(tmp_path):
     common = COMMON + "  BIT@: {slot: 6, register: 0, bit: 0, ros: in}\n"
-    rack = built(tmp_path, common, FOLLOW=(5, FOLLOW))
-    rack.start()
+    rack = run_for(built(tmp_path, common, FOLLOW=(5, FOLLOW)))
     shown: list[object] = []
 
     def move(_: int) -> None:
@@ -277,8 +265,7 @@ def test_a_frozen_word_and_its_bits_keep_the_order_of_writes(tmp_path):
 
 
 def test_what_an_operator_sets_waits_too(tmp_path):
-    rack = built(tmp_path, FOLLOW=(5, FOLLOW))
-    rack.start()
+    rack = run_for(built(tmp_path, FOLLOW=(5, FOLLOW)))
     shown: list[object] = []
 
     def move(_: int) -> None:
@@ -291,9 +278,7 @@ def test_what_an_operator_sets_waits_too(tmp_path):
 
 
 def test_inputs_that_nobody_waits_for_follow_the_process(tmp_path):
-    rack = built(tmp_path, FOLLOW=(5, FOLLOW))
-    rack.start()
-    rack.run(0.01)
+    rack = run_for(built(tmp_path, FOLLOW=(5, FOLLOW)), 0.01)
     rack.operations.stop("FOLLOW")
     shown: list[object] = []
 
@@ -308,8 +293,7 @@ def test_inputs_that_nobody_waits_for_follow_the_process(tmp_path):
 
 def test_stop_all_ends_interrupts_and_frees_inputs(tmp_path):
     rack = built(tmp_path, FOLLOW=(5, FOLLOW))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
 
     def stop(_: int) -> None:
         rack.write("POSITION%", 7)
@@ -329,8 +313,7 @@ def test_a_reloaded_task_has_the_interrupt_of_its_new_source(tmp_path):
     from automax_ros.core.diagnostics import SourceText
 
     rack = built(tmp_path, FOLLOW=(5, FOLLOW))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     rack.run(0.03)
     quiet = "10 COMMON SEEN%\n20 CALL SCAN_LOOP(TICKS=10)\n30 SEEN% = 5\n40 END\n"
     rack.operations.reload("FOLLOW", SourceText("FOLLOW.BLK", quiet))
@@ -389,8 +372,7 @@ def test_what_is_frozen_is_part_of_the_state(tmp_path):
 def test_writes_that_waited_are_the_writers_own(tmp_path):
     rack = built(tmp_path, FOLLOW=(5, FOLLOW))
     told: list[tuple[int, WriteKind]] = []
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     plain = seen.written
 
     def note(writes) -> None:
@@ -449,8 +431,7 @@ def test_what_waits_in_a_basic_task_freezes_too():
 
 def test_a_power_cycle_ends_the_clock_until_the_task_turns_it_on_again(tmp_path):
     rack = built(tmp_path, FOLLOW=(5, FOLLOW))
-    seen = Watching(rack)
-    rack.start()
+    seen = Watching(rack).start()
     rack.run(0.03)
     rack.operations.power_off()
     rack.run(0.1)

@@ -8,7 +8,7 @@ from automax_ros.compile.native.run.cache import NativeCache
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms, NativeMode
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import rack_at, run_for
 
 CONFIG = Path(__file__).parents[2] / "config" / "section_drive" / "rack.yaml"
 
@@ -19,11 +19,7 @@ def native(tmp_path_factory):
 
 
 def rack_of(forms):
-    config = load(CONFIG).config
-    assert config is not None
-    rack = Rack(config, native=forms)
-    rack.start()
-    return rack
+    return run_for(rack_at(CONFIG, native=forms))
 
 
 def is_native(rack, name):

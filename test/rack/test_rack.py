@@ -7,10 +7,10 @@ import pytest
 from automax_ros.core.kinds import WriteKind, WriterKind
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rack.tasks.installation import RackError
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER, PRESET_WRITER, ROS_WRITER
 from automax_ros.runtime.memory.views import MemoryValueError
 from automax_ros.runtime.tasks.task import Status
+from rack.helpers import rack_at, run_for
 
 RACK = """\
 rack: LINE1
@@ -94,19 +94,22 @@ def build(tmp_path):
             (tmp_path / f"{name}.BLK").write_text(text)
         path = Path(tmp_path / "rack.yaml")
         path.write_text(yaml)
-        config = load(path).config
-        assert config is not None, load(path).diagnostics
-        return Rack(config, stopwatch=stopwatch)
+        return rack_at(path, stopwatch=stopwatch)
 
     return made
 
 
-def test_tasks_start_by_priority_then_name_and_keep_their_periods(build):
-    rack = build()
-    assert [task.name for task in rack.tasks] == ["FIRST", "LATE", "ALPHA"]
-    notes = Notes()
+def noted(build, settings=()):
+    """A started rack, and notes of all that has happened in it."""
+    rack, notes = build(), Notes()
     rack.observe(notes)
-    rack.start()
+    rack.start(settings)
+    return rack, notes
+
+
+def test_tasks_start_by_priority_then_name_and_keep_their_periods(build):
+    rack, notes = noted(build)
+    assert [task.name for task in rack.tasks] == ["FIRST", "LATE", "ALPHA"]
     rack.run(0.022)
     scans = [(event[3] / 1e6, event[1]) for event in notes.events if event[0] == "scanned" and event[2] > 0]
     assert scans == [
@@ -126,9 +129,7 @@ def test_scans_per_second(build):
 
 
 def test_presets_then_settings_then_the_part_before_scan_loop(build):
-    rack, notes = build(), Notes()
-    rack.observe(notes)
-    rack.start([("REF%", -5), ("SUM%", 9)])
+    rack, notes = noted(build, [("REF%", -5), ("SUM%", 9)])
     kind, writes = notes.events[0]
     assert kind == "written"
     names = [rack.memory.specs[write.view].name for write in writes]
@@ -148,15 +149,12 @@ def test_presets_then_settings_then_the_part_before_scan_loop(build):
 
 
 def test_battery_status_tells_modules_with_a_battery(build):
-    rack = build()
-    rack.start()
+    rack = run_for(build())
     assert [rack.value(f"BATTERYSTATUS{slot}@") for slot in (0, 1, 3)] == [True, True, False]
 
 
 def test_writes_from_outside_act_on_the_next_scan(build):
-    rack, notes = build(), Notes()
-    rack.observe(notes)
-    rack.start()
+    rack, notes = noted(build)
     rack.run(0.005)
     rack.write("REF%", 20, ROS_WRITER)
     assert rack.value("SUM%") == 102
@@ -179,9 +177,7 @@ def test_writes_from_outside_act_on_the_next_scan(build):
     ],
 )
 def test_refused_write_changes_nothing(build, name, values):
-    rack, notes = build(), Notes()
-    rack.observe(notes)
-    rack.start()
+    rack, notes = noted(build)
     told, before = len(notes.events), rack.memory.image()
     with pytest.raises(MemoryValueError):
         rack.write_view(rack.memory.view(name), values, ROS_WRITER)
@@ -201,9 +197,7 @@ def test_unknown_names(build):
 
 
 def test_tuning_is_told_to_observers(build):
-    rack, notes = build(), Notes()
-    rack.observe(notes)
-    rack.start()
+    rack, notes = noted(build)
     rack.run(0.005)
     first = rack.task("FIRST")
     rack.tune(first, "GAIN%", 10)
@@ -224,9 +218,7 @@ def test_tuning_is_told_to_observers(build):
 
 
 def test_fault_stops_all_tasks_and_zeroes_volatile_commons(build):
-    rack, notes = build(), Notes()
-    rack.observe(notes)
-    rack.start()
+    rack, notes = noted(build)
     rack.run(0.005)
     rack.write("GO@", True)
     rack.run(0.010)
@@ -250,8 +242,7 @@ def test_fault_stops_all_tasks_and_zeroes_volatile_commons(build):
 def test_fault_before_scan_loop_starts_no_further_task(build):
     loop = "20 FOR N% = 1 TO 2\n30 N% = 1\n40 NEXT N%\n"
     endless = f"10 COMMON ORDER! \\ LOCAL N%\n{loop}100 CALL SCAN_LOOP(TICKS=2)\n110 END\n"
-    rack = build(FIRST=endless)
-    rack.start()
+    rack = run_for(build(FIRST=endless))
     assert rack.stop_reason is not None
     assert rack.stop_reason.startswith("task FIRST: scan 0, line 20")
     rack.run(1.0)
@@ -264,9 +255,7 @@ def test_fault_before_scan_loop_starts_no_further_task(build):
 
 
 def test_stop_keeps_memory(build):
-    rack = build()
-    rack.start()
-    rack.run(0.1)
+    rack = run_for(build(), 0.1)
     before = rack.memory.image()
     rack.operations.stop_tasks()
     rack.run(1.0)
@@ -294,17 +283,13 @@ def test_task_that_waits_for_an_event_that_no_module_sets_is_refused(build):
 
 def test_stopwatch_measures_each_scan(build):
     times = iter(range(0, 10**9, 1000))
-    rack = build(stopwatch=lambda: next(times))
-    rack.start()
-    rack.run(0.1)
+    rack = run_for(build(stopwatch=lambda: next(times)), 0.1)
     statistics = rack.statistics["FIRST"]
     assert (statistics.scans, statistics.total_ns, statistics.longest_ns) == (10, 10_000, 1000)
 
 
 def test_wall_clock_counts_skipped_scans_and_stays_on_the_grid(build):
-    rack, notes = build(), Notes()
-    rack.observe(notes)
-    rack.start()
+    rack, notes = noted(build)
     for wall_ms in (0, 3, 12, 57, 58, 66):
         rack.scheduler.run_due(wall_ms * 1_000_000)
     scans = [event[3] / 1e6 for event in notes.events if event[0] == "scanned" and event[1] == "FIRST" and event[2]]
@@ -338,8 +323,6 @@ def test_writers_have_stable_ids(build):
 def test_simulated_runs_are_equal(build):
     images = []
     for _ in range(2):
-        rack = build()
-        rack.start()
-        rack.run(1.0)
+        rack = run_for(build(), 1.0)
         images.append((rack.memory.image(), [task.snapshot() for task in rack.tasks]))
     assert images[0] == images[1]

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import rack_at, run_for
 from rack.modules.udc_racks import Seen, built, written
 
 POINTS = """\
@@ -51,8 +51,7 @@ def with_interrupt(folder, n: int) -> Rack:
 def test_registers_go_out_after_scan_n_less_1_and_the_interrupt_follows(tmp_path, n):
     """Scan k is at (k - 0.5) x 1 ms here: the Nth ones are n, 2n ...; out and interrupt one scan before."""
     rack = with_interrupt(tmp_path, n)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0105)
     before = [k for k in range(1, 11) if k % n == (n - 1) % n]
     assert seen.of("SLOW_OUT%") == [(1000 * k - 500, k) for k in before]
@@ -66,8 +65,7 @@ def test_registers_go_out_after_scan_n_less_1_and_the_interrupt_follows(tmp_path
 def test_what_the_interrupted_task_answers_is_read_in_the_nth_scan(tmp_path, n):
     """The UDC's copy changes only in scans n, 2n ...: GOT% shows there what was written after the interrupt before."""
     rack = with_interrupt(tmp_path, n)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0105)
     expected = []
     answers = 0
@@ -81,8 +79,7 @@ def test_what_the_interrupted_task_answers_is_read_in_the_nth_scan(tmp_path, n):
 
 def test_the_counter_shows_scans_since_the_nth(tmp_path):
     rack = with_interrupt(tmp_path, 5)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0125)
     assert [value for _, value in seen.of("COUNT%")] == [1, 2, 3, 4, 0, 1, 2, 3, 4, 0, 1, 2]
     rack.write("NTH%", 0)
@@ -94,8 +91,7 @@ def test_the_counter_shows_scans_since_the_nth(tmp_path):
 def test_every_scan_registers_come_in_at_the_start_of_the_next_scan(tmp_path):
     source = UDC.replace("140 GOT% = SLOW_IN%", "140 GOT% = FAST_IN%")
     rack = built(tmp_path, POINTS, tasks="WIND_A: {drive: A}", WIND_A=source)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0007)
     rack.write("FAST_IN%", 12)
     rack.run(0.0008)
@@ -117,8 +113,7 @@ def test_two_registers_hold_a_real_or_a_double_integer(tmp_path, real, whole):
 120 Y! = WIDE!
 900 END
 """
-    rack = built(tmp_path, POINTS, tasks="WIND_A: {drive: A}", WIND_A=source)
-    rack.start()
+    rack = run_for(built(tmp_path, POINTS, tasks="WIND_A: {drive: A}", WIND_A=source))
     rack.write("GAIN", real)
     rack.write("WIDE!", whole)
     rack.run(0.0016)
@@ -161,9 +156,7 @@ FORCED = """\
 
 
 def test_a_force_holds_in_the_local_memory_too(tmp_path):
-    rack = built(tmp_path, POINTS, tasks="WIND_A: {drive: A}", WIND_A=FORCED)
-    rack.start()
-    rack.run(0.0021)
+    rack = run_for(built(tmp_path, POINTS, tasks="WIND_A: {drive: A}", WIND_A=FORCED), 0.0021)
     assert (rack.value("FAST_OUT%"), rack.value("GOT%")) == (2, 3)
     rack.force("FAST_OUT%", 70)
     rack.run(0.002)
@@ -214,9 +207,7 @@ def test_a_basic_task_waits_for_the_interrupt_too(tmp_path):
     source = UDC.replace("30 CCLK@ = TRUE", "30 CCLK@ = TRUE\n40 NTH% = 3").replace("COMMON ", "COMMON NTH%, ")
     path = written(tmp_path, POINTS + "  SEEN%: {}\n", tasks="WIND_A: {drive: A}", WIND_A=source)
     path.write_text(path.read_text().replace("LINE: {priority: 5}", "LINE: {priority: 5}, BG: {priority: 9}"))
-    rack = Rack(load(path).config)
-    rack.start()
-    rack.run(0.0301)
+    rack = run_for(rack_at(path), 0.0301)
     assert (rack.value("SEEN%"), rack.task("BG").value("N%")) == (29, 10)
 
 
@@ -226,8 +217,7 @@ def test_a_late_host_leaves_scans_out_but_not_their_interrupt(tmp_path):
     TIMEOUT is 50 ms here: a host that is late by more than that must not look like a UDC that does not interrupt.
     """
     rack = with_interrupt(tmp_path, 5)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     for now_ms in (1, 2, 30, 100, 102):
         rack.scheduler.run_due(now_ms * 1_000_000)
     assert rack.operations.stopped is None

@@ -104,10 +104,12 @@ def scans(task: CmlTask, port: PlantPort, until_ns: int, modeled: bool = False):
     port.now_ns = now_ns
 
 
-def finished(steps):
-    """The record of a scan in steps, which take no time."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
+def finished(steps, times=()):
+    """The record of a scan in steps; it is sent the times one after the other, then None."""
+    sent = iter(times)
+    try:
+        next(steps)
+        while True:
+            steps.send(next(sent, None))
+    except StopIteration as end:
+        return end.value

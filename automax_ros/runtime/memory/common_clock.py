@@ -14,7 +14,7 @@ from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 ENABLE_BIT = 6
-"""The bit that drives the clock, in a UDC's register 2000 as in the ISCR of I/O modules (decision; 57C411 p. 4-1)."""
+"""The bit that drives the clock, in a UDC's register 2000 as in the ISCR of I/O modules (decision): 57C411 p. 4-1."""
 SECOND_DRIVER = "38"
 """The hardware's code where two modules drive the clock (S-3056 p. 4-4)."""
 

@@ -136,7 +136,7 @@ class RegisterMap:
     def _shown(self, view: int, words: dict[int, int], read: Callable[[int, int], Value]) -> Value:
         """Return the value of a point from its registers; ``words`` are those that have just changed.
 
-        Bits that are no REAL show as 0 or as its largest (decision).
+        Bits that are not a REAL show as 0 or as its largest (decision).
         """
         place = self._places[view]
         found = [words.get(number, _unsigned(read(place.bank, number))) for number in self._registers(view)]

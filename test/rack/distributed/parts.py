@@ -6,8 +6,8 @@ from pathlib import Path
 
 from automax_ros.rack.distributed.image_sync import Batch, ImageSync
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
+from rack.helpers import config_at
 
 RACK = """
 rack: CUT1
@@ -54,9 +54,7 @@ def config_in(folder: Path, text: str = RACK) -> RackConfig:
     """Return the rack, read from files in a folder."""
     for name, source in (("rack.yaml", text), ("ONE.BLK", ONE), ("TWO.BLK", TWO), ("WIND_A.BLK", WIND_A)):
         (folder / name).write_text(source, encoding="ascii")
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return result.config
+    return config_at(folder / "rack.yaml")
 
 
 class Process:
@@ -69,9 +67,10 @@ class Process:
         self.taken: dict[int, int] = {}
         self.link.begin()
 
-    def start(self) -> None:
+    def start(self) -> Process:
         self.rack.start()
         self.link.starting = False
+        return self
 
     def hear(self, other: Process, most: int | None = None) -> None:
         """Take what another has sent and this one has not taken, at most some batches."""
@@ -84,10 +83,7 @@ class Process:
 
 def cut(config: RackConfig) -> list[Process]:
     """Return the rack's processes, started."""
-    processes = [Process(config, slots) for slots in SEATS]
-    for process in processes:
-        process.start()
-    return processes
+    return [process.start() for process in [Process(config, slots) for slots in SEATS]]
 
 
 def settle(processes: list[Process]) -> None:

@@ -55,6 +55,13 @@ def idle(config) -> list[Process]:
     return processes
 
 
+def run(processes, seconds: float) -> None:
+    """Let all run, and receive what the others have sent."""
+    for process in processes:
+        process.rack.run(seconds)
+    settle(processes)
+
+
 @REPEATABLE
 @given(story=st.lists(deeds(), min_size=1, max_size=40))
 def test_all_images_come_to_hold_the_same(config, story):
@@ -103,9 +110,7 @@ def shown(process, place, bit):
 def test_a_task_of_one_process_feeds_a_task_of_another(config):
     home, one, two = processes = cut(config)
     for _ in range(20):
-        for process in processes:
-            process.rack.run(0.0055)
-        settle(processes)
+        run(processes, 0.0055)
     assert one.rack.value("A%") == two.rack.value("A%") == home.rack.value("A%") == 7 + 20
     # TWO latches what ONE wrote in the tick before.
     assert home.rack.value("B%") == 7 + 19
@@ -155,8 +160,7 @@ def test_a_scan_that_was_late_gives_way_to_what_was_written_after_its_deadline(c
 def test_a_scan_that_is_late_does_not_see_what_was_written_after_its_deadline(config, at_ns, kind, first, second):
     """The scan of 5.5 ms has not been made yet when the batch comes: it sees what it would have seen in time."""
     for way in ("write", "picture"):
-        two = Process(config, SEATS[2])
-        two.start()
+        two = Process(config, SEATS[2]).start()
         two.rack.run(0.0055)
         view = two.rack.memory.view("A%")
         if way == "write":
@@ -173,8 +177,7 @@ def test_a_scan_that_is_late_does_not_see_what_was_written_after_its_deadline(co
 
 
 def test_what_start_up_parts_wrote_is_there_before_the_first_scans(config):
-    two = Process(config, SEATS[2])
-    two.start()
+    two = Process(config, SEATS[2]).start()
     two.link.receive(Batch(1, 1, 0, 3, WriteKind.BASIC, ((two.rack.memory.view("A%"), 0, 40),)))
     two.rack.run(0.001)
     assert two.rack.value("B%") == 40
@@ -183,8 +186,7 @@ def test_what_start_up_parts_wrote_is_there_before_the_first_scans(config):
 @pytest.mark.parametrize("end", ["stop", "last", "lost"])
 def test_what_waits_for_its_time_is_taken_before_the_rack_stops_or_an_image_is_shown(config, end):
     """Else an output that was set before a STOP ALL came on again after it."""
-    home = Process(config, SEATS[0])
-    home.start()
+    home = Process(config, SEATS[0]).start()
     home.rack.run(0.0055)
     view = home.rack.memory.view("OUT7@")
     tick = home.rack.scheduler.every(
@@ -213,8 +215,7 @@ def test_a_damaged_image_that_waits_for_its_time_ends_nothing(config):
             take()
         reported.append(raised)
 
-    two = Process(config, SEATS[2], guard=guard)
-    two.start()
+    two = Process(config, SEATS[2], guard=guard).start()
     two.rack.run(0.0055)
     word = next(iter(two.rack.memory.registers.views))
     two.link.merge(ImageCopy(1, (VersionedValue(word, 0, float("inf"), 0xFFFF, (6 * NS_PER_MS, 1, 1)),), ()))
@@ -240,16 +241,12 @@ def test_a_force_holds_everywhere_until_it_is_released(config):
     home, one, two = processes = cut(config)
     home.rack.force("A%", 500)
     settle(processes)
-    for process in processes:
-        process.rack.run(0.011)
-    settle(processes)
+    run(processes, 0.011)
     assert one.rack.value("A%") == two.rack.value("A%") == 500
     assert [force.name for force in two.rack.forces()] == ["A%"]
     home.rack.unforce("A%")
     settle(processes)
-    for process in processes:
-        process.rack.run(0.011)
-    settle(processes)
+    run(processes, 0.011)
     assert two.rack.value("A%") == 502
     assert two.rack.forces() == []
 
@@ -321,9 +318,7 @@ def test_a_stop_and_a_run_at_one_instant_are_told_in_their_order(config):
 
 def test_a_process_that_joins_takes_over_what_the_others_hold(config):
     home, one, two = processes = cut(config)
-    for process in processes:
-        process.rack.run(0.05)
-    settle(processes)
+    run(processes, 0.05)
     home.rack.write("T%", 44, element=2)
     home.rack.write("S$", "HELLO")
     home.rack.write("OUT3@", value=True)
@@ -365,8 +360,7 @@ def test_what_happens_in_every_process_by_itself_is_sent_by_the_home_alone(confi
     assert [len(process.sent) - before for process, before in zip(processes, sent, strict=True)] == [1, 0, 0]
     # A write of 3 ms that comes now is older.
     home, one, _ = processes
-    late = Process(config, SEATS[1])
-    late.start()
+    late = Process(config, SEATS[1]).start()
     late.rack.operations.stop_tasks()
     late.rack.scheduler.pass_until(3 * NS_PER_MS)
     late.rack.write("A%", 30)

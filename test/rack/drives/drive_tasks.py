@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import rack_at
 
 YAML = """\
 rack: PM1
@@ -67,9 +67,7 @@ def folder_of(folder: Path, *, extra: str = "", cml: str = CML, speed: str = SPE
 
 def rack_of(folder: Path, **changes: str) -> Rack:
     """Return the rack, not started."""
-    found = load(folder_of(folder, **changes))
-    assert found.config is not None, found.diagnostics
-    return Rack(found.config)
+    return rack_at(folder_of(folder, **changes))
 
 
 def permit(rack: Rack) -> None:

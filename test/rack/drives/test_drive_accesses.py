@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from automax_ros.drive.current_loop.signals import late_us
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.drive import ACCESS_NS
+from rack.helpers import rack_at
 from rack.modeled.modeled_drives import follow, held
 
 ACCESS_US = ACCESS_NS / 1000
@@ -88,9 +87,7 @@ def test_a_state_with_a_delayed_command_goes_on_bit_for_bit(tmp_path):
         rack.run(0.00001)
     state = rack.state()
     assert port.state()["delayed"] is not None
-    found = load(tmp_path / "rack.yaml")
-    assert found.config is not None
-    other = Rack(found.config)
+    other = rack_at(tmp_path / "rack.yaml")
     other.load(state)
     for one in (rack, other):
         one.run(0.1)

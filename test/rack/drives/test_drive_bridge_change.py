@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from automax_ros.rack.rack import Rack
+from rack.helpers import run_for
 from rack.modules.cml_racks import built
 
 
 def at_speed(folder: Path, *, wired: bool, fast_in_standby: bool) -> Rack:
     """Return a rack whose motor has more than 200 V of EMF and 55 % of its current on bridge 1."""
-    rack = built(folder, analog="57C405, drive: 7" if wired else "57C405")
-    rack.start()
+    rack = run_for(built(folder, analog="57C405, drive: 7" if wired else "57C405"))
     rack.write("PERMIT@", True)
     rack.write("SPEED%", 2000)
     rack.run(0.6)

@@ -10,7 +10,7 @@ import pytest
 from automax_ros.rack.operator.faults import Display, DriveTrips, displays_of
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import rack_at, run_for
 
 FAULTS = {"IOC@": 7110, "SYNC@": 7111, "TACH@": 7112, "OSV@": 7113, "IET@": 7114, "PHROT@": 7115, "BAD@": 7116}
 YAML = """\
@@ -57,24 +57,27 @@ SPEED = """\
 """
 
 
-def powered(folder: Path, *, yaml: str = YAML, cml: str = CML) -> Rack:
-    """Return a rack that has run for a while; nobody has started its drive."""
+def rack_of(folder: Path, *, yaml: str = YAML, cml: str = CML, execution: str = "ideal") -> Rack:
+    """Return the rack, not started."""
     (folder / "CML.BLK").write_text(cml)
     (folder / "SPEED.BLK").write_text(SPEED)
-    (folder / "rack.yaml").write_text(yaml + "".join(f"  {name}: {{}}\n" for name in FAULTS))
-    found = load(folder / "rack.yaml")
-    assert found.config is not None, found.diagnostics
-    rack = Rack(found.config)
-    rack.start()
+    text = yaml.replace("rack: PM1\n", f"rack: PM1\nexecution: {execution}\n")
+    (folder / "rack.yaml").write_text(text + "".join(f"  {name}: {{}}\n" for name in FAULTS))
+    return rack_at(folder / "rack.yaml")
+
+
+def powered(folder: Path, **changes: str) -> Rack:
+    """Return a rack that has run for a while; nobody has started its drive."""
+    rack = run_for(rack_of(folder, **changes))
     rack.write("PERMIT@", True)
     rack.run(0.6)
     return rack
 
 
-def turning(folder: Path, counts: int = 2500) -> Rack:
+def turning(folder: Path, counts: int = 2500, **changes: str) -> Rack:
     """Return a rack whose drive keeps a speed."""
-    rack = powered(folder)
-    start(rack)
+    rack = powered(folder, **changes)
+    assert start(rack)
     rack.write("WANTED%", counts)
     rack.run(2.0)
     assert abs(rack.value("SPD%") - counts) < 300

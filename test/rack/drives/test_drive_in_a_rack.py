@@ -11,10 +11,10 @@ import pytest
 
 from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
+from rack.helpers import rack_at, run_for
 from rack.modules.cml_racks import ALONE, CML, COMMONS, NEAR, built, started
 
 
@@ -214,8 +214,7 @@ def test_a_rack_with_a_drive_goes_on_from_a_state_bit_for_bit(tmp_path, slots, d
     def make() -> Rack:
         return built(tmp_path, slots=slots, drive=drive, execution=execution)
 
-    rack = make()
-    rack.start()
+    rack = run_for(make())
     rack.write("PERMIT@", True)
     rack.write("SPEED%", 2000)
     rack.write("REF%", 1500)
@@ -294,10 +293,7 @@ def test_two_drives_of_a_rack_do_not_disturb_each_other(tmp_path):
     built(tmp_path)
     text = (tmp_path / "rack.yaml").read_text().replace(ALONE, TWO) + commons
     (tmp_path / "rack.yaml").write_text(text.replace("plants:\n", "plants:\n  WINDER: {motor: dc_10hp_240v}\n"))
-    found = load(tmp_path / "rack.yaml")
-    assert found.config is not None, found.diagnostics
-    both = Rack(found.config)
-    both.start()
+    both = run_for(rack_at(tmp_path / "rack.yaml"))
     for name in ("PERMIT@", "PERMIT2@"):
         both.write(name, True)
     both.write("SPEED%", 2000)

@@ -9,8 +9,7 @@ from replay.replays import record, replayed
 
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
-from rack.drives.test_drive_faults import CML, FAULTS, SPEED, YAML, active, logged, reset, start
+from rack.drives.test_drive_faults import CML, YAML, active, logged, rack_of, reset, start, turning
 
 BLIND = CML.replace("OSV_FDBK=SPD%, ", "")
 """Without OSV_FDBK the loop looks for no overspeed (52.1.5); the threshold is 3600 counts, 1538.5 rpm."""
@@ -19,26 +18,9 @@ OVERHAULING_NM = "-2000"
 """A load that drives the shaft."""
 
 
-def rack_of(folder: Path, *, cml: str = BLIND, yaml: str = YAML, execution: str = "ideal") -> Rack:
-    (folder / "CML.BLK").write_text(cml)
-    (folder / "SPEED.BLK").write_text(SPEED)
-    text = yaml.replace("rack: PM1\n", f"rack: PM1\nexecution: {execution}\n")
-    (folder / "rack.yaml").write_text(text + "".join(f"  {name}: {{}}\n" for name in FAULTS))
-    found = load(folder / "rack.yaml")
-    assert found.config is not None, found.diagnostics
-    return Rack(found.config)
-
-
-def turning(rack: Rack) -> Rack:
-    """Let a drive keep a speed below the threshold."""
-    rack.start()
-    rack.write("PERMIT@", True)
-    rack.run(0.6)
-    assert start(rack)
-    rack.write("WANTED%", 2500)
-    rack.run(2.0)
-    assert active(rack) == set()
-    return rack
+def blind(folder: Path, **changes: str) -> Rack:
+    """Return a rack whose drive keeps a speed below the threshold."""
+    return turning(folder, **{"cml": BLIND, **changes})
 
 
 def rpm(rack: Rack) -> float:
@@ -65,7 +47,7 @@ def slow_down(rack: Rack) -> None:
 
 @pytest.mark.parametrize("execution", ["ideal", "modeled"])
 def test_a_drive_whose_loop_does_not_see_the_speed_trips(tmp_path, execution):
-    rack = turning(rack_of(tmp_path, execution=execution))
+    rack = blind(tmp_path, execution=execution)
     speed = beyond(rack)
     assert LIMIT_RPM < speed < 1.1 * LIMIT_RPM
     assert active(rack) == {"OSV@"}
@@ -88,13 +70,13 @@ def test_a_drive_whose_loop_does_not_see_the_speed_trips(tmp_path, execution):
 @pytest.mark.parametrize("text", ["DIGITAL_TACH=FALSE, ", "OSV_THRESH=0, "])
 def test_without_a_digital_tachometer_or_a_threshold_nothing_trips(tmp_path, text):
     cml = BLIND.replace("OSV_THRESH=3600, ", "OSV_THRESH=3600, " + text if "FALSE" in text else text)
-    rack = turning(rack_of(tmp_path, cml=cml))
+    rack = turning(tmp_path, cml=cml)
     assert beyond(rack) > 1.1 * LIMIT_RPM
     assert active(rack) == set()
 
 
 def test_a_sound_osv_fdbk_trips_first_and_is_logged_once(tmp_path):
-    rack = turning(rack_of(tmp_path, cml=CML))
+    rack = turning(tmp_path)
     beyond(rack)
     SwitchOperations(rack).plant("UNWIND", "load_torque_nm", "-200")
     rack.run(0.2)
@@ -105,13 +87,13 @@ def test_a_sound_osv_fdbk_trips_first_and_is_logged_once(tmp_path):
 def test_the_threshold_follows_the_scale_of_the_tachometer(tmp_path):
     """4095 counts are what the feed says, not the motor's base speed."""
     yaml = YAML.replace("value: [-1750.0, 1750.0]", "value: [-1400.0, 1400.0]")
-    rack = turning(rack_of(tmp_path, yaml=yaml))
+    rack = blind(tmp_path, yaml=yaml)
     assert 3600 / 4095 * 1400 < beyond(rack) < 1.1 * 3600 / 4095 * 1400
 
 
 def test_it_stays_on_guard_while_the_task_is_stopped(tmp_path):
     """The motor runs away with the drive off; the trip is told as the task runs again, and holds the drive off."""
-    rack = turning(rack_of(tmp_path))
+    rack = blind(tmp_path)
     rack.operations.stop("CML")
     SwitchOperations(rack).plant("UNWIND", "load_torque_nm", OVERHAULING_NM)
     rack.run(1.0)
@@ -126,7 +108,7 @@ def test_it_stays_on_guard_while_the_task_is_stopped(tmp_path):
 
 
 def test_a_loss_of_power_forgets_the_trip(tmp_path):
-    rack = turning(rack_of(tmp_path))
+    rack = blind(tmp_path)
     beyond(rack)
     rack.operations.power_off()
     slow_down(rack)
@@ -139,7 +121,7 @@ def test_a_loss_of_power_forgets_the_trip(tmp_path):
 
 def test_the_trip_needs_no_scan(tmp_path):
     """Interrupts whose scans never end: the hardware takes gates and contactor away by itself."""
-    rack = turning(rack_of(tmp_path))
+    rack = blind(tmp_path)
     port = rack.drives.port(7)
     port._interrupts._due = lambda *_: None
     port._controller.overspeed.counts = 2600
@@ -160,7 +142,7 @@ def test_a_recording_with_a_trip_runs_again(tmp_path, execution):
         elif number == 12:
             rack.write("WANTED%", 4000)
 
-    rack = rack_of(tmp_path, execution=execution)
+    rack = rack_of(tmp_path, cml=BLIND, execution=execution)
     bag = record(rack, tmp_path / "bag", steps, seconds=4.0)
     assert logged(rack) == [7119]
     report = replayed(bag)
@@ -170,13 +152,13 @@ def test_a_recording_with_a_trip_runs_again(tmp_path, execution):
 def test_a_state_goes_on_bit_for_bit(tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
-    rack = turning(rack_of(tmp_path / "a"))
+    rack = blind(tmp_path / "a")
     rack.write("WANTED%", 4000)
     while rpm(rack) < LIMIT_RPM + 5:
         rack.run(0.001)
     assert not rack.value("OSV@"), "it still counts"
     state = rack.state()
-    again = rack_of(tmp_path / "b")
+    again = rack_of(tmp_path / "b", cml=BLIND)
     for task in rack.tasks:
         again.task(task.name).restore(task.snapshot())
     again.load(state)

@@ -11,8 +11,8 @@ from automax_ros.drive.assess.drive_case import DriveCase
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.drives import drive_cases
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
+from rack.helpers import config_at, run_for
 
 MOTORS = ("dc_10hp_240v", "dc_150hp_500v", "dc_800hp_700v")
 GAINS = {"KP": "KP=0.2", "PI_W_LEAD": "PI_W_LEAD=60.0", "AG_FACTOR": "AG_FACTOR=40", "CC_THRESH": "CC_THRESH=700"}
@@ -57,9 +57,7 @@ class Current(NamedTuple):
 
 def config_of(file: Path) -> RackConfig:
     """Return a rack file that is sound."""
-    found = load(file)
-    assert found.config is not None, found.diagnostics
-    return found.config
+    return config_at(file)
 
 
 def case_of(file: Path) -> DriveCase:
@@ -106,8 +104,7 @@ def held(
         shown = f"{proposed:.10g}" if keyword in ("AG_FACTOR", "CC_THRESH") else f"{proposed:.4f}"
         source = source.replace(GAINS[keyword], f"{keyword}={shown}")
     (folder / "CML.BLK").write_text(source)
-    rack = Rack(config_of(folder / "rack.yaml"))
-    rack.start()
+    rack = run_for(Rack(config_of(folder / "rack.yaml")))
     rack.write("PERMIT@", True)
     rack.run(0.6)
     rack.write("FAST@", fast)

@@ -6,9 +6,9 @@ import pytest
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.scan.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.runtime.tasks.task import Status
+from rack.helpers import Observer, rack_at, run_for
 
 TASK = """10 COMMON {name}%
 20 CALL SCAN_LOOP(TICKS={ticks})
@@ -29,9 +29,7 @@ def rack_of(tmp_path, tasks: dict[str, tuple[int, int]], tick: str = "0.5") -> R
     (tmp_path / "rack.yaml").write_text(text)
     for name, (_, ticks) in tasks.items():
         (tmp_path / f"{name}.BLK").write_text(TASK.format(name=name, ticks=ticks))
-    result = load(tmp_path / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_at(tmp_path / "rack.yaml")
 
 
 def commits(rack: Rack, seconds: float) -> list[tuple[str, int]]:
@@ -59,9 +57,7 @@ def test_a_higher_priority_suspends_a_lower_one(tmp_path):
 
 def test_an_overlap_stops_all(tmp_path):
     tasks = {f"T{number}": (4 + number, 1) for number in range(6)}
-    rack = rack_of(tmp_path, tasks)
-    rack.start()
-    rack.run(0.01)
+    rack = run_for(rack_of(tmp_path, tasks), 0.01)
     assert rack.operations.stopped is not None
     assert rack.operations.stopped.code == "14"
     assert rack.operations.stopped.time_ns == 500_000
@@ -91,9 +87,7 @@ def built(tmp_path, slots: dict[int, str], commons: str, **sources: str) -> Rack
         (tmp_path / f"{name}.BLK").write_text(text)
     listed = "".join(f"  {slot}: {module}\n" for slot, module in slots.items())
     (tmp_path / "rack.yaml").write_text(f"rack: R\nexecution: modeled\nslots:\n{listed}common:\n{commons}")
-    result = load(tmp_path / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_at(tmp_path / "rack.yaml")
 
 
 def remarks(count: int, first: int = 1000) -> str:
@@ -179,9 +173,7 @@ def test_the_manuals_example_of_100_and_299(tmp_path, same):
     for slot, listed in enumerate(tasks, 1):
         slots[slot] = f"{{module: 57C435, tick_ms: 0.5, tasks: {listed}}}"
     commons = "  COMM_VAR%: {preset: 100}\n  FIRST%: {}\n  SECOND%: {}\n  BASIC%: {}\n"
-    rack = built(tmp_path, slots, commons, ABC=abc, XYZ=xyz)
-    rack.start()
-    rack.run(0.0019)
+    rack = run_for(built(tmp_path, slots, commons, ABC=abc, XYZ=xyz), 0.0019)
     names = ("COMM_VAR%", "FIRST%", "SECOND%", "BASIC%")
     assert [rack.value(name) for name in names] == [299, 100, 100, 299]
     rack.run(0.002)
@@ -200,9 +192,7 @@ def test_the_manuals_example_of_100_and_299(tmp_path, same):
 def test_a_task_alone_overlaps_just_above_its_period(tmp_path, count, stopped_ns):
     text = f"10 LOCAL A%\n20 CALL SCAN_LOOP(TICKS=1)\n{remarks(count)}3000 END\n"
     module = "{module: 57C435, tick_ms: 0.5, tasks: {A: {priority: 5}}}"
-    rack = built(tmp_path, {0: module}, "  X%: {}\n", A=text)
-    rack.start()
-    rack.run(0.1)
+    rack = run_for(built(tmp_path, {0: module}, "  X%: {}\n", A=text), 0.1)
     stopped = rack.operations.stopped
     assert (None if stopped is None else stopped.time_ns) == stopped_ns
     assert rack.statistics["A"].scans == (200 if stopped_ns is None else 0)
@@ -212,9 +202,7 @@ def test_a_task_alone_overlaps_just_above_its_period(tmp_path, count, stopped_ns
 def test_tasks_overlap_when_together_they_need_more_than_there_is(tmp_path, count, stopped_ns):
     """Two scans of HIGH and 93.82 + 9.88 a remark: 991.26 or 1001.14 of 1000 us."""
     low = f"10 LOCAL A%\n20 CALL SCAN_LOOP(TICKS=2)\n{remarks(count)}3000 END\n"
-    rack = built(tmp_path, {0: TWO}, COMMONS, HIGH=HIGH, LOW=low)
-    rack.start()
-    rack.run(0.05)
+    rack = run_for(built(tmp_path, {0: TWO}, COMMONS, HIGH=HIGH, LOW=low), 0.05)
     stopped = rack.operations.stopped
     assert (None if stopped is None else (stopped.time_ns, stopped.task, stopped.code)) == (
         None if stopped_ns is None else (stopped_ns, "LOW", "14")
@@ -228,13 +216,9 @@ def test_tasks_overlap_when_together_they_need_more_than_there_is(tmp_path, coun
 def test_an_overlap_is_told_as_a_scan_that_has_nothing_but_its_error(tmp_path):
     seen = []
 
-    class Notes:
+    class Notes(Observer):
         def scanned(self, task, record, _) -> None:
             seen.append((task.name, record.scan, record.time_ns, record.errors, record.reads))
-
-        def written(self, writes) -> None: ...
-
-        def tuned(self, task, now_ns) -> None: ...
 
         def operated(self, operation) -> None:
             seen.append((operation.what, operation.task, operation.at_ns))
@@ -261,9 +245,7 @@ GIVEN_UP = f"""10 COMMON SEEN%, OUT%
 
 def test_a_scan_that_is_given_up_leaves_nothing_but_what_it_has_written(tmp_path):
     module = "{module: 57C435, tick_ms: 0.5, tasks: {A: {priority: 5}}}"
-    rack = built(tmp_path, {0: module}, "  SEEN%: {}\n  OUT%: {}\n", A=GIVEN_UP)
-    rack.start()
-    rack.run(0.00115)
+    rack = run_for(built(tmp_path, {0: module}, "  SEEN%: {}\n  OUT%: {}\n", A=GIVEN_UP), 0.00115)
     task = rack.task("A")
     assert (rack.value("SEEN%"), rack.value("OUT%"), task.scan_number, task.value("N%")) == (4, 2, 1, 2)
     rack.operations.stop("A")
@@ -277,9 +259,7 @@ def test_a_scan_that_is_given_up_leaves_nothing_but_what_it_has_written(tmp_path
 
 def test_what_is_tuned_while_a_scan_is_under_way_is_in_force_from_the_next_one(tmp_path):
     module = "{module: 57C435, tick_ms: 0.5, tasks: {A: {priority: 5}}}"
-    rack = built(tmp_path, {0: module}, "  SEEN%: {}\n  OUT%: {}\n", A=GIVEN_UP)
-    rack.start()
-    rack.run(0.00005)
+    rack = run_for(built(tmp_path, {0: module}, "  SEEN%: {}\n  OUT%: {}\n", A=GIVEN_UP), 0.00005)
     rack.tune(rack.task("A"), "GAIN%", 5)
     rack.run(0.00095)
     assert rack.value("OUT%") == 2
@@ -301,8 +281,7 @@ def test_tasks_start_in_the_order_of_priority_and_name_before_anything_is_latche
     module = f"{{module: 57C435, tick_ms: 1.0, tasks: {{{listed}}}}}"
     commons = "  ORDER%(9): {}\n  NEXT%: {}\n" + "".join(f"  {name}%: {{}}\n" for name in digits)
     sources = {name: text.format(name=name, digit=digit) for name, (_, digit) in digits.items()}
-    rack = built(tmp_path, {0: module}, commons, **sources)
-    rack.start()
+    rack = run_for(built(tmp_path, {0: module}, commons, **sources))
     assert [rack.value("ORDER%", place) for place in range(4)] == [1, 2, 3, 4]
     assert commits_of(rack, 0.001) == ["D%", "A%", "B%", "C%"]
 

@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.runtime.scan.modeled_execution import ModeledExecution
+from rack.helpers import Observer, config_at
 
 HEAD = """\
 10 COMMON A%, B%, C%, D!, X@, R, T%(5)
@@ -99,12 +99,10 @@ def config_of(tasks, execution: str) -> RackConfig:
         f"  2: {{module: 57C431, tick_ms: 1.5, tasks: {{{', '.join(listed[2])}}}}}\n"
         "common:\n  A%: {}\n  B%: {}\n  C%: {}\n  D!: {}\n  X@: {}\n  R: {}\n  T%(5): {}\n"
     )
-    result = load(path)
-    assert result.config is not None, result.diagnostics
-    return result.config
+    return config_at(path)
 
 
-class Notes:
+class Notes(Observer):
     """All that observers of a rack are told."""
 
     def __init__(self, rack: Rack) -> None:
@@ -117,8 +115,6 @@ class Notes:
 
     def written(self, writes) -> None:
         self.entries += [("write", *write[1:]) for group in writes for write in group.entries()]
-
-    def tuned(self, task, now_ns) -> None: ...
 
     def operated(self, operation) -> None:
         self.entries.append(("operation", operation))

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import Observer, rack_at
 
 BLOCKS = {
     "SUMMER(INPUT1=A%, INPUT2=1, OUTPUT=B%)": (11_280, 44_000),
@@ -72,7 +72,7 @@ class Written:
         )
 
 
-class Commits:
+class Commits(Observer):
     """Notes when a scan wrote what it changed, and whose it was."""
 
     def __init__(self, rack: Rack) -> None:
@@ -81,12 +81,6 @@ class Commits:
 
     def scanned(self, task, record, writes) -> None:  # noqa: ARG002
         self.found += [(item.time_ns, task.name) for item in writes if item.writer == task.writer]
-
-    def written(self, writes) -> None: ...
-
-    def tuned(self, task, now_ns) -> None: ...
-
-    def operated(self, operation) -> None: ...
 
 
 @st.composite
@@ -145,9 +139,7 @@ def built(tasks: list[Written], tick_ms: str, column: int, folder: Path) -> Rack
     (folder / "rack.yaml").write_text(f"{head}    tasks:\n{listed}common:\n{commons}")
     for task in tasks:
         (folder / f"{task.name}.BLK").write_text(task.text())
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, [item.message for item in result.diagnostics]
-    return Rack(result.config)
+    return rack_at(folder / "rack.yaml")
 
 
 def commits_as_simulated(tasks: list[Written], tick_ms: str, column: int) -> None:

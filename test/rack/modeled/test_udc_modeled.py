@@ -7,6 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.runtime.tasks.task import Status
+from rack.helpers import run_for
 from rack.modules.udc_racks import Seen, built
 
 TOP = "execution: modeled\n"
@@ -43,8 +44,7 @@ def modeled(folder, *, a: str = A, b: str = B.format(more=""), ticks: int = 3, *
 
 def test_outputs_reach_the_dual_port_when_the_modeled_scans_end(tmp_path):
     rack = modeled(tmp_path)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0049)
     assert [(time, value) for time, name, value in seen.writes if name == "A_OUT%"] == [
         (1_016_000, 1), (2_516_000, 2), (4_016_000, 3),
@@ -57,8 +57,7 @@ def test_outputs_reach_the_dual_port_when_the_modeled_scans_end(tmp_path):
 def test_one_task_alone_pays_for_the_messages_of_both(tmp_path):
     """With 312 us more in SCAN_LOOP and 100 in END: 928.00 us."""
     rack = built(tmp_path, POINTS, top=TOP, tasks="WIND_A: {drive: A}", WIND_A=A)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0016)
     assert [(time, value) for time, name, value in seen.writes if name == "A_OUT%"] == [(1_428_000, 1)]
 
@@ -71,9 +70,7 @@ def test_both_together_beyond_their_ticks_are_an_overlap(tmp_path, remarks, over
         "CALL SUMMER(INPUT1=N%, INPUT2=0, OUTPUT=A_OUT%)", "CALL DIFFERENCE(INPUT1=5, INPUT2=2, OUTPUT=A_OUT%)"
     )
     more = "".join(f"{200 + number} ! NOTE\n" for number in range(remarks))
-    rack = modeled(tmp_path, a=a, b=B.format(more=more), ticks=2)
-    rack.start()
-    rack.run(0.0049)
+    rack = run_for(modeled(tmp_path, a=a, b=B.format(more=more), ticks=2), 0.0049)
     stopped = rack.operations.stopped
     assert (stopped is not None) == overlaps
     if stopped is not None:
@@ -86,9 +83,7 @@ def test_an_input_is_that_of_the_start_of_the_scan(tmp_path):
     """The application registers come in at 0.5 ms, before the latch of B; feedback is read when B latches."""
     b = B.format(more="").replace("A_OUT%, B_OUT%", "IN%, FB%, B_OUT%")
     b = b.replace("INPUT1=A_OUT%, INPUT2=1000", "INPUT1=IN%, INPUT2=FB%")
-    rack = modeled(tmp_path, b=b)
-    rack.start()
-    rack.run(0.0008)
+    rack = run_for(modeled(tmp_path, b=b), 0.0008)
     rack.write("IN%", 5)
     rack.write("FB%", 300)
     rack.run(0.0010)
@@ -99,8 +94,7 @@ def test_an_input_is_that_of_the_start_of_the_scan(tmp_path):
 
 def test_a_task_that_is_stopped_in_its_scan_leaves_the_other_to_go_on(tmp_path):
     rack = modeled(tmp_path)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0007)
     rack.operations.stop("WIND_A")
     rack.run(0.0008)

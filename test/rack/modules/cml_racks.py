@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import rack_at
 
 COMMONS = (
     "REF%", "RUN@", "RESET@", "STATE@", "LOCKED@", "PERIOD%", "I_FDBK%", "DELTA%", "BRIDGE@", "POSA@", "POSB@",
@@ -68,9 +68,7 @@ def built(
         + commons
     )
     (folder / "rack.yaml").write_text(text)
-    found = load(folder / "rack.yaml")
-    assert found.config is not None, found.diagnostics
-    return Rack(found.config)
+    return rack_at(folder / "rack.yaml")
 
 
 def started(folder: Path, **options: object) -> Rack:

@@ -10,8 +10,8 @@ from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
 from automax_ros.drive.current_loop.signals import Command, Measured
 from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
+from rack.helpers import rack_at, run_for
 
 YAML = """\
 rack: PM1
@@ -50,9 +50,7 @@ def built(folder: Path, *, yaml: str = YAML, plant: str = "", task: str = IDLE) 
     """Return a rack that was not started."""
     (folder / "IDLE.BLK").write_text(task)
     (folder / "rack.yaml").write_text(yaml.replace(", PLANT", f", {plant}" if plant else ""))
-    found = load(folder / "rack.yaml")
-    assert found.config is not None, found.diagnostics
-    return Rack(found.config)
+    return rack_at(folder / "rack.yaml")
 
 
 def controller(rack: Rack, slot: int = 7) -> DriveControllerModule:
@@ -72,9 +70,10 @@ class Hand:
         self.inputs = INPUTS._replace(**inputs)
         self.seen: list[tuple[int, Measured, Command]] = []
 
-    def arm(self, first_ns: int) -> None:
+    def arm(self, first_ns: int) -> Hand:
         """Let the module interrupt."""
         self.port.arm(first_ns, EventKey(EventClass.SCAN, 4, "CML"), self.due)
+        return self
 
     def set(self, **inputs: Any) -> None:
         """Change inputs."""
@@ -97,10 +96,8 @@ class Hand:
 
 def turning(folder: Path, seconds: float = 1.0, **inputs: Any) -> tuple[Rack, Hand]:
     """Return a rack whose drive has been started and turns its motor for some time."""
-    rack = built(folder)
-    rack.start()
-    hand = Hand(rack, **inputs)
-    hand.arm(0)
+    rack = run_for(built(folder))
+    hand = Hand(rack, **inputs).arm(0)
     rack.write("PERMIT@", True)
     rack.run(0.6)
     hand.set(cml_run=True)

@@ -87,9 +87,10 @@ class Cable:
         for rack in racks:
             station(rack).connect(self._from(rack))
 
-    def start(self) -> None:
+    def start(self) -> Cable:
         for rack in self.racks:
             rack.start()
+        return self
 
     def cycles(self, count: int) -> None:
         """Let all racks run for cycles of the network, together in steps of 0.5 ms."""

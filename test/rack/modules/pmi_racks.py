@@ -7,7 +7,7 @@ from pathlib import Path
 from automax_ros.drive.plant.plant import RAD_S_PER_RPM, DrivePlant
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import rack_at, run_for
 
 YAML = """\
 rack: PM1
@@ -89,16 +89,12 @@ def written(folder: Path, source: str = SPEED_LOOP, *, plant: str = "inertia: 3.
 
 def built(folder: Path, source: str = SPEED_LOOP, *, plant: str = "inertia: 3.0", points: str = "") -> Rack:
     """Return the rack, not started."""
-    found = load(written(folder, source, plant=plant, points=points))
-    assert found.config is not None, found.diagnostics
-    return Rack(found.config)
+    return rack_at(written(folder, source, plant=plant, points=points))
 
 
 def started(folder: Path, source: str = SPEED_LOOP, *, plant: str = "inertia: 3.0", reference: int = 2048) -> Rack:
     """Return the rack 0.8 s after its start: locked, started at 0.4 s with a reference."""
-    rack = built(folder, source, plant=plant)
-    rack.start()
-    rack.run(0.4)
+    rack = run_for(built(folder, source, plant=plant), 0.4)
     rack.write("WANT@", True)
     rack.run(0.4)
     assert rack.value("RUNNING@")

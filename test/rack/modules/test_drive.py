@@ -21,16 +21,15 @@ from automax_ros.drive.current_loop.signals import (
 )
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
+from rack.helpers import run_for
 from rack.modules.drive_racks import CYCLE_NS, YAML, Hand, built, controller, turning
 
 SCAN = EventKey(EventClass.SCAN, 4, "CML")
 
 
 def test_it_interrupts_six_times_a_line_cycle(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
-    hand = Hand(rack)
-    hand.arm(5_500_000)
+    rack = run_for(built(tmp_path))
+    hand = Hand(rack).arm(5_500_000)
     rack.run(2.0)
     instants = [now for now, _, _ in hand.seen]
     assert instants[0] == 5_500_000
@@ -43,8 +42,7 @@ def test_it_interrupts_six_times_a_line_cycle(tmp_path):
 
 
 def test_without_a_command_the_interval_stays(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     seen: list[int] = []
     port = rack.drives.port(7)
 
@@ -66,8 +64,7 @@ def test_without_a_command_the_interval_stays(tmp_path):
 
 
 def test_a_command_that_comes_late_moves_the_next_interrupt_to_the_present_at_the_earliest(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     port, seen = rack.drives.port(7), []
     port.arm(1_000_000, SCAN, lambda now, _: seen.append(now))
     rack.run(0.002)
@@ -79,8 +76,7 @@ def test_a_command_that_comes_late_moves_the_next_interrupt_to_the_present_at_th
 
 def test_scans_stand_in_their_place_among_those_of_an_instant(tmp_path):
     """Interrupts come before all scans of their instant, the scan that they make due by priority and name."""
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     order: list[str] = []
     for name, priority in (("A", 4), ("D", 4), ("Z", 3)):
         key = EventKey(EventClass.SCAN, priority, name)
@@ -91,10 +87,8 @@ def test_scans_stand_in_their_place_among_those_of_an_instant(tmp_path):
 
 
 def test_on_the_wall_clock_late_interrupts_are_carried_out_in_order_and_counted(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
-    hand = Hand(rack)
-    hand.arm(0)
+    rack = run_for(built(tmp_path))
+    hand = Hand(rack).arm(0)
     rack.scheduler.run_due(2_900_000)
     rack.scheduler.run_due(20_000_000)
     instants = [now for now, _, _ in hand.seen]
@@ -109,8 +103,7 @@ def test_on_the_wall_clock_late_interrupts_are_carried_out_in_order_and_counted(
 
 
 def test_the_summary_of_a_live_run_shows_it(tmp_path, capsys):
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     Hand(rack).arm(0)
     rack.scheduler.run_due(1_200_000)
     for live in (True, False):
@@ -120,11 +113,9 @@ def test_the_summary_of_a_live_run_shows_it(tmp_path, capsys):
 
 
 def test_initialisation_writes_the_defaults_and_later_writes_stay(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     rack.write("TLD%", 77)
-    hand = Hand(rack)
-    hand.arm(0)
+    hand = Hand(rack).arm(0)
     assert rack.value("TLD%") == 77
     rack.run(0.001)
     assert [rack.value(name) for name in ("TLD%", "PLLP%", "PLLT%", "FAST@")] == [109, 4, 2, False]
@@ -153,19 +144,15 @@ def test_tasks_reach_its_four_registers_and_no_other(tmp_path):
 170 READ%(6) = IOREAD%(7, 4147)
 180 END
 """
-    rack = built(tmp_path, task=task)
-    rack.start()
-    rack.run(0.005)
+    rack = run_for(built(tmp_path, task=task), 0.005)
     assert rack.task("IDLE").value("READ%") == [0, 0, 55, 8, 0, 0, 0]
     assert rack.task("IDLE").errors.count == 2
 
 
 @pytest.mark.parametrize(("name", "bit"), [("PERMIT@", PERMISSIVE), ("IET@", EXTERNAL_TRIP)])
 def test_it_reads_the_inputs_of_the_drive_digital_module(tmp_path, name, bit):
-    rack = built(tmp_path)
-    rack.start()
-    hand = Hand(rack)
-    hand.arm(0)
+    rack = run_for(built(tmp_path))
+    hand = Hand(rack).arm(0)
     rack.run(0.01)
     assert hand.seen[-1][1].status == LINE | VOLTAGE
     rack.write(name, True)
@@ -177,20 +164,16 @@ def test_it_reads_the_inputs_of_the_drive_digital_module(tmp_path, name, bit):
 
 
 def test_a_slot_without_a_digital_module_permits_nothing(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
-    hand = Hand(rack, dig_io_slot=5)
-    hand.arm(0)
+    rack = run_for(built(tmp_path))
+    hand = Hand(rack, dig_io_slot=5).arm(0)
     rack.write("PERMIT@", True)
     rack.run(0.01)
     assert hand.seen[-1][1].status == LINE | VOLTAGE
 
 
 def test_the_switches_on_its_front_are_seen_and_let_go(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
-    hand = Hand(rack)
-    hand.arm(0)
+    rack = run_for(built(tmp_path))
+    hand = Hand(rack).arm(0)
 
     def status() -> int:
         rack.run(0.01)
@@ -217,8 +200,7 @@ def test_the_switches_on_its_front_are_seen_and_let_go(tmp_path):
 
 
 def test_relays_and_drive_ok_stand_in_the_digital_module_and_other_outputs_stay(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     rack.write("LAMP@", True)
     port = rack.drives.port(7)
     wanted = iter(Command(2_777_778, relays=relays, ok=ok) for relays, ok in ((1, True), (2, False), (0, True)))
@@ -274,10 +256,8 @@ def test_the_plant_goes_on_while_the_rack_does_not(tmp_path, loss):
 
 
 def test_without_a_plant_there_is_no_line(tmp_path):
-    rack = built(tmp_path, yaml=YAML.replace(", plant: UNWIND", ""))
-    rack.start()
-    hand = Hand(rack)
-    hand.arm(0)
+    rack = run_for(built(tmp_path, yaml=YAML.replace(", plant: UNWIND", "")))
+    hand = Hand(rack).arm(0)
     rack.run(1.5)
     assert {measured.status for _, measured, _ in hand.seen} == {VOLTAGE}
     assert not hand.loop.outputs.sync_locked
@@ -287,10 +267,8 @@ def test_without_a_plant_there_is_no_line(tmp_path):
 @pytest.mark.parametrize("armed_first", [False, True])
 def test_a_state_goes_on_bit_for_bit_wherever_it_is_cut(tmp_path, cut_s, armed_first):
     """Before the lock, while the contactor closes, at the first pulses, under current: through JSON."""
-    rack = built(tmp_path)
-    rack.start()
-    hand = Hand(rack, cml_run=False, reference=2000)
-    hand.arm(0)
+    rack = run_for(built(tmp_path))
+    hand = Hand(rack, cml_run=False, reference=2000).arm(0)
     rack.write("PERMIT@", True)
     rack.run(min(cut_s, 0.6))
     hand.set(cml_run=True)
@@ -324,9 +302,7 @@ def test_a_state_goes_on_bit_for_bit_wherever_it_is_cut(tmp_path, cut_s, armed_f
 
 
 def test_a_plant_at_rest_is_looked_at_after_a_state_was_loaded(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
-    rack.run(0.0123)
+    rack = run_for(built(tmp_path), 0.0123)
     other = built(tmp_path)
     other.load(rack.state())
     for one in (rack, other):

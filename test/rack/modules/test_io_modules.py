@@ -14,6 +14,7 @@ from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.registry import SUPPORTED
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.views import Place, ViewSpec
+from rack.helpers import rack_at, run_for
 
 DIRECTIONS = {
     "57C402": "o",
@@ -32,9 +33,7 @@ def built(folder: Path, model: str, points: str, task: str = "10 CALL SCAN_LOOP(
     (folder / "T.BLK").write_text(task)
     slots = f"  0: {{module: 57C435, tasks: {{T: {{priority: 8}}}}}}\n  4: {{module: {model}}}\n"
     (folder / "rack.yaml").write_text(f"rack: PM1\nslots:\n{slots}common:\n{points}")
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    return Rack(config)
+    return rack_at(folder / "rack.yaml")
 
 
 @pytest.mark.parametrize("model", DIRECTIONS)
@@ -48,9 +47,7 @@ def test_each_register_is_written_by_who_may_write_it(tmp_path, model):
                 built(tmp_path, model, points, task)
             assert {item.code for _, items in refused.value.findings for item in items} == {"AMX4017"}
         else:
-            rack = built(tmp_path, model, points, task)
-            rack.start()
-            rack.run(0.005)
+            rack = run_for(built(tmp_path, model, points, task), 0.005)
             assert rack.value(f"R{number}%") == 8
     assert SUPPORTED[model].models[model]
     beyond = f"  X%: {{slot: 4, register: {len(expected)}}}\n"
@@ -63,8 +60,7 @@ def test_each_register_is_written_by_who_may_write_it(tmp_path, model):
 @pytest.mark.parametrize("model", DIRECTIONS)
 def test_stop_all_clears_outputs_and_keeps_inputs(tmp_path, model):
     expected = DIRECTIONS[model]
-    rack = built(tmp_path, model, "")
-    rack.start()
+    rack = run_for(built(tmp_path, model, ""))
     view = rack.memory.view("SLOT:4%")
     rack.write_view(view, [(number, 9) for number in range(len(expected))], 1)
     rack.operations.stop_all("test")
@@ -82,9 +78,7 @@ def test_ioread_and_iowrite_follow_the_registers(tmp_path):
 70 GONE% = GONE% + IOREAD%(5, 0)
 80 END
 """
-    rack = built(tmp_path, "57C409", "", task)
-    rack.start()
-    rack.run(0.005)
+    rack = run_for(built(tmp_path, "57C409", "", task), 0.005)
     done = rack.task("T")
     assert (done.value("SEEN%"), done.value("GONE%")) == (11, 0)
     log = done.errors
@@ -144,8 +138,7 @@ def test_user_registers_take_either_direction(tmp_path):
     """Both models have 65536 registers there; what is ``ros: in`` is an input, and STOP ALL clears all of them."""
     points = "  OUT%: {slot: 4, register: 65535}\n  IN@: {slot: 4, register: 0, bit: 15, ros: in}\n"
     task = "10 COMMON OUT%, IN@\n20 CALL SCAN_LOOP(TICKS=1)\n30 IF IN@ THEN OUT% = OUT% + 1\n40 END\n"
-    rack = built(tmp_path, "57C423", points, task)
-    rack.start()
+    rack = run_for(built(tmp_path, "57C423", points, task))
     rack.write("IN@", True)
     rack.run(0.0165)
     assert (rack.value("OUT%"), rack.value("SLOT:4%", 0)) == (3, -32768)

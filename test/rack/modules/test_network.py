@@ -11,10 +11,10 @@ from automax_ros.rack.modules.network import CYCLE_NS
 from automax_ros.rack.modules.network_drops import MISSES, MOST_RIVALS, TIMEOUT_CYCLES, DropMessage, Reception, Sender
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.network import greatest_depth, registers_of
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
+from rack.helpers import Observer, config_at
 from rack.modules.network_racks import LINE, MASTER, SLAVE, WIND, Cable, built, station
 
 LOST_AFTER = TIMEOUT_CYCLES * MISSES
@@ -32,8 +32,7 @@ def wind(tmp_path) -> Rack:
 
 @pytest.fixture
 def cable(line, wind) -> Cable:
-    cable = Cable(line, wind)
-    cable.start()
+    cable = Cable(line, wind).start()
     cable.cycles(4)
     return cable
 
@@ -77,8 +76,7 @@ def test_the_status_of_a_slave_shows_its_drops_and_the_master(cable, wind):
 
 def test_the_master_shows_drops_whose_depth_a_task_has_defined(tmp_path, line):
     silent = built(tmp_path / "wind", SLAVE, WIND.replace("110 DEPTH% = 2\n", "").replace(", DEPTH%", ""))
-    cable = Cable(line, silent)
-    cable.start()
+    cable = Cable(line, silent).start()
     line.write("SPEED%", 5)
     cable.cycles(6)
     assert silent.value("REF%") == line.value("FEEDBACK%") == 5, "a drop communicates before its depth is defined"
@@ -196,8 +194,7 @@ def test_counters(cable, wind):
 
 def test_two_racks_with_one_drop_are_told_to_both(tmp_path, line, wind):
     other = built(tmp_path / "other", SLAVE.replace("rack: WIND", "rack: TWIN").replace("drop: 3", "drop: 4"), WIND)
-    cable = Cable(line, wind, other)
-    cable.start()
+    cable = Cable(line, wind, other).start()
     cable.cycles(8)
     assert [str(item) for item in station(wind).status().rivals] == ["rack TWIN slot 5"]
     assert [str(item) for item in station(other).status().rivals] == ["rack WIND slot 5"]
@@ -209,8 +206,7 @@ def test_two_racks_with_one_drop_are_told_to_both(tmp_path, line, wind):
 
 def test_two_masters_are_told_to_all(tmp_path, line, wind):
     second = built(tmp_path / "second", MASTER.replace("rack: LINE", "rack: LINE2"), LINE)
-    cable = Cable(line, wind, second)
-    cable.start()
+    cable = Cable(line, wind, second).start()
     line.write("SPEED%", 10)
     second.write("SPEED%", 20)
     cable.cycles(8)
@@ -251,14 +247,9 @@ def test_frames_that_no_station_sends_are_counted_and_dropped(cable, line, frame
 def test_what_arrives_is_written_by_the_module_at_that_instant(cable, line, wind):
     log: list = []
 
-    class Watcher:
-        def scanned(self, *_: object) -> None: ...
-
+    class Watcher(Observer):
         def written(self, writes: list) -> None:
             log.extend(entry for group in writes for entry in group.entries())
-
-        def tuned(self, *_: object) -> None: ...
-        def operated(self, *_: object) -> None: ...
 
     wind.observe(Watcher())
     line.write("SPEED%", 4321)
@@ -328,8 +319,7 @@ def test_registers_by_role():
 def test_a_task_that_writes_the_wrong_half_is_an_error(tmp_path):
     (tmp_path / "LINE.BLK").write_text(LINE.replace("OUTPUT1=REF%", "OUTPUT1=FEEDBACK%").replace("REF%", "FEEDBACK%"))
     (tmp_path / "rack.yaml").write_text(MASTER)
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
+    config = config_at(tmp_path / "rack.yaml")
     assert [item.code for item in check_tasks(config)[0].result.diagnostics] == ["AMX4017"]
 
 

@@ -48,8 +48,7 @@ def test_the_two_racks_are_linked(tmp_path):
         "30 CALL MOVE(INPUT1=REF%, OUTPUT1=SPEED%)\n40 END\n"
     )
     racks = [built(tmp_path / "line", first, line), built(tmp_path / "winder", second, winder)]
-    cable = Cable(*racks)
-    cable.start()
+    cable = Cable(*racks).start()
     cable.cycles(5)
     assert racks[0].value("WIND_SPEED%") == 900
     assert racks[0].value("WIND_THERE@")

@@ -6,6 +6,7 @@ import pytest
 
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.runtime.tasks.task import Status
+from rack.helpers import run_for
 from rack.modules.udc_racks import Seen, built
 
 A = """\
@@ -36,8 +37,7 @@ def plain(folder, ticks=2, **more):
 
 def test_b_acts_on_what_a_has_written_in_the_same_scan(tmp_path):
     rack = plain(tmp_path)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0031)
     assert [item for item in seen.scans if item[1] != "LINE"] == [
         (0, "WIND_A", 0),
@@ -56,8 +56,7 @@ def test_b_acts_on_what_a_has_written_in_the_same_scan(tmp_path):
 @pytest.mark.parametrize("ticks", [1, 3, 20])
 def test_a_scan_comes_every_ticks_of_half_a_millisecond(tmp_path, ticks):
     rack = plain(tmp_path, ticks)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0305)
     instants = [time for time, task, scan in seen.scans if task == "WIND_B" and scan]
     assert instants == list(range(500_000, 30_500_000, ticks * 500_000))
@@ -66,8 +65,7 @@ def test_a_scan_comes_every_ticks_of_half_a_millisecond(tmp_path, ticks):
 def test_without_the_common_clock_no_task_passes_scan_loop(tmp_path):
     source = A.format(ticks=2).replace("30 CCLK@ = TRUE\n", "30 A_OUT% = 7\n")
     rack = built(tmp_path, OUTS, WIND_A=source, WIND_B=B.format(ticks=2))
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.01)
     assert [(task, scan) for _, task, scan in seen.scans if task != "LINE"] == [("WIND_A", 0), ("WIND_B", 0)]
     rack.write("CCLK@", True)
@@ -83,8 +81,7 @@ def test_without_the_common_clock_no_task_passes_scan_loop(tmp_path):
 
 def test_a_task_that_is_run_later_joins_the_scans_of_the_module(tmp_path):
     rack = plain(tmp_path, 4)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.operations.stop("WIND_B")
     rack.run(0.0052)
     rack.operations.run("WIND_B")
@@ -102,8 +99,7 @@ def test_two_modules_share_the_time_base(tmp_path):
     other = "}\n  11: {module: 57552, tasks: {WIND_C: {drive: B}}"
     third = "10 COMMON C_OUT%\n20 LOCAL N%\n100 CALL SCAN_LOOP(TICKS=3)\n110 N% = N% + 1\n120 C_OUT% = N%\n900 END\n"
     rack = built(tmp_path, points, more=other, WIND_A=A.format(ticks=2), WIND_B=B.format(ticks=2), WIND_C=third)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0045)
     assert [time for time, task, scan in seen.scans if task == "WIND_C" and scan] == [500_000, 2_000_000, 3_500_000]
     assert [time for time, task, scan in seen.scans if task == "WIND_A" and scan][:3] == [500_000, 1_500_000, 2_500_000]
@@ -125,8 +121,7 @@ def test_two_modules_that_drive_the_clock_are_code_38(tmp_path):
 
 def test_the_clock_is_off_after_stop_all_until_a_task_enables_it_again(tmp_path):
     rack = plain(tmp_path)
-    seen = Seen(rack)
-    rack.start()
+    seen = Seen(rack).start()
     rack.run(0.0032)
     rack.operations.stop_all("for a test")
     assert rack.value("A_OUT%") == 0
@@ -166,8 +161,7 @@ def kept(folder):
 
 @pytest.mark.parametrize("how", ["stop_all", "power"])
 def test_a_udc_loses_locals_and_registers_and_keeps_tunables_and_feedback(tmp_path, how):
-    rack = kept(tmp_path)
-    rack.start()
+    rack = run_for(kept(tmp_path))
     task = rack.task("WIND_A")
     rack.tune(task, "GAIN%", 7)
     for name in ("FB%", "SW%", "STATE%", "CMD%"):
@@ -188,9 +182,7 @@ def test_a_udc_loses_locals_and_registers_and_keeps_tunables_and_feedback(tmp_pa
 
 def test_the_error_log_of_a_udc_task_outlives_stop_all(tmp_path):
     source = A.format(ticks=2).replace("120 A_OUT% = N%", "120 A_OUT% = 1 / (N% - N%)")
-    rack = built(tmp_path, OUTS, WIND_A=source, WIND_B=B.format(ticks=2))
-    rack.start()
-    rack.run(0.002)
+    rack = run_for(built(tmp_path, OUTS, WIND_A=source, WIND_B=B.format(ticks=2)), 0.002)
     count = rack.task("WIND_A").errors.count
     assert count == 4  # each scan logs the division by zero and the clamp
     rack.operations.stop_all("for a test")
@@ -201,8 +193,7 @@ def test_a_reload_with_other_ticks_than_the_other_task_is_refused(tmp_path):
     from automax_ros.core.diagnostics import SourceText
     from automax_ros.rack.tasks.installation import RackError
 
-    rack = plain(tmp_path)
-    rack.start()
+    rack = run_for(plain(tmp_path))
     with pytest.raises(RackError) as refused:
         rack.operations.reload("WIND_A", SourceText("WIND_A.BLK", A.format(ticks=4)))
     codes = {item.code for _, items in refused.value.findings for item in items}
@@ -216,8 +207,7 @@ def test_a_reload_with_other_ticks_than_the_other_task_is_refused(tmp_path):
 
 def test_on_the_wall_clock_scans_that_are_late_are_skipped_and_counted(tmp_path):
     """At 20.2 ms the scans of 0.5, 1.5 ... 19.5 ms are due: the last one happens, 19 are skipped, the grid stays."""
-    rack = plain(tmp_path)
-    rack.start()
+    rack = run_for(plain(tmp_path))
     for now_ns in (0, 1, 20_200_000, 20_400_000, 20_500_000):
         rack.scheduler.run_due(now_ns)
     assert [rack.statistics[name].skipped for name in ("WIND_A", "WIND_B")] == [19, 19]
@@ -229,8 +219,7 @@ def test_on_the_wall_clock_scans_that_are_late_are_skipped_and_counted(tmp_path)
 def test_an_io_module_can_drive_the_clock_of_a_udc(tmp_path):
     points = OUTS + "  RES%: {slot: 5, register: 3}\n"
     source = A.format(ticks=2).replace("30 CCLK@ = TRUE\n", "")
-    rack = built(tmp_path, points, more="}\n  5: {module: 57C411", WIND_A=source, WIND_B=B.format(ticks=2))
-    rack.start()
+    rack = run_for(built(tmp_path, points, more="}\n  5: {module: 57C411", WIND_A=source, WIND_B=B.format(ticks=2)))
     rack.run(0.001)
     rack.write("RES%", 64)
     rack.run(0.0016)

@@ -11,8 +11,8 @@ import pytest
 from automax_ros.drive.pmi.registers import COMMAND_REGISTERS, DRIVE_B, FEEDBACK_REGISTERS, LINK_REGISTERS
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.udc import RETAINED, UDC_REGISTERS
+from rack.helpers import config_at, run_for
 
 PAGE = (Path(__file__).parents[3] / "docs" / "udc.md").read_text(encoding="utf-8")
 WHO = {
@@ -51,11 +51,9 @@ def test_the_example_runs(tmp_path):
     (tmp_path / "WIND_A.BLK").write_text(udc)
     (tmp_path / "LINE.BLK").write_text(line)
     (tmp_path / "rack.yaml").write_text(re.search(r"```yaml[^\n]*\n(.*?)```", PAGE, re.S)[1])
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
+    config = config_at(tmp_path / "rack.yaml")
     assert [item.result.diagnostics for item in check_tasks(config)] == [[], []]
-    rack = Rack(config)
-    rack.start()
+    rack = run_for(Rack(config))
     rack.write("S10A_PMI_FB%", 1000)
     rack.run(1.0)
     assert rack.operations.stopped is None
@@ -68,12 +66,9 @@ def test_the_example_runs(tmp_path):
 def test_the_example_with_a_plant_turns_its_motor(tmp_path):
     (tmp_path / "WIND_A.BLK").write_text(re.findall(r"```blk[^\n]*\n(.*?)```", PAGE, re.S)[2])
     (tmp_path / "rack.yaml").write_text(re.findall(r"```yaml[^\n]*\n(.*?)```", PAGE, re.S)[1])
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
+    config = config_at(tmp_path / "rack.yaml")
     assert [item.result.diagnostics for item in check_tasks(config)] == [[]]
-    rack = Rack(config)
-    rack.start()
-    rack.run(0.4)
+    rack = run_for(Rack(config), 0.4)
     rack.write("RUN@", True)
     rack.run(0.4)
     rack.write("SPD_REF%", 2000)

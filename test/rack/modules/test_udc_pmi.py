@@ -11,7 +11,7 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.drive.pmi import registers as table
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.state import RackState
-from automax_ros.rackfile.loader import load
+from rack.helpers import rack_at, run_for
 from rack.modules.pmi_racks import CURRENT, IDLE, SPEED_LOOP, breaks, built, rpm, started, winder
 
 BASE_RPM = 1750
@@ -22,6 +22,20 @@ RUN_UNLESS_OVERLOAD = "RUN@ = WANT@ AND NOT OVERLOAD@"
 def word(rack: Rack, name: str) -> int:
     """A register's 16 bits."""
     return int(rack.value(name)) & 0xFFFF
+
+
+def reset(rack: Rack) -> None:
+    """Press the fault reset."""
+    rack.write("FRESET@", True)
+    rack.run(0.02)
+    rack.write("FRESET@", False)
+
+
+def runs(rack: Rack) -> bool:
+    """Ask for the drive; return whether it runs 0.4 s later."""
+    rack.write("WANT@", True)
+    rack.run(0.4)
+    return bool(rack.value("RUNNING@"))
 
 
 def test_it_runs_to_the_speed_of_a_speed_loop(tmp_path):
@@ -91,22 +105,17 @@ def test_a_held_shaft_trips_thermal_overload_in_its_time_and_the_task_stops_the_
 
 
 def test_without_permissive_nothing_starts_and_a_lost_one_coasts_without_a_fault(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     rack.write("PERMIT@", False)
     rack.run(0.4)
     assert not word(rack, "STATUS%") & table.READY
-    rack.write("WANT@", True)
-    rack.run(0.4)
-    assert not rack.value("RUNNING@")
+    assert not runs(rack)
     assert rack.value("WARN%") == table.NOT_PERMITTED
     assert word(rack, "STATUS%") & table.WARNING
     rack.write("WANT@", False)
     rack.write("PERMIT@", True)
     rack.run(0.1)
-    rack.write("WANT@", True)
-    rack.run(0.4)
-    assert rack.value("RUNNING@")
+    assert runs(rack)
     rack.write("PERMIT@", False)
     rack.run(0.01)
     assert not rack.value("RUNNING@")
@@ -140,9 +149,7 @@ def test_a_fault_stops_the_drive_until_it_is_reset(tmp_path, cause, bit):
     rack.write("IET@", False)
     rack.write("WANT@", False)
     rack.run(0.5)
-    rack.write("FRESET@", True)
-    rack.run(0.02)
-    rack.write("FRESET@", False)
+    reset(rack)
     assert word(rack, "FAULTS%") == 0
     rack.write("WANT@", True)
     rack.run(0.5)
@@ -150,8 +157,7 @@ def test_a_fault_stops_the_drive_until_it_is_reset(tmp_path, cause, bit):
 
 
 def test_a_shorted_scr_is_found_before_the_start(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     breaks(rack, "short_scr", "13")
     rack.run(0.4)
     rack.write("WANT@", True)
@@ -162,9 +168,7 @@ def test_a_shorted_scr_is_found_before_the_start(tmp_path):
 
 
 def test_a_line_of_the_other_rotation_is_a_fault_unless_the_drive_may_take_either(tmp_path):
-    rack = built(tmp_path, plant="line: {rotation: ABC}")
-    rack.start()
-    rack.run(0.4)
+    rack = run_for(built(tmp_path, plant="line: {rotation: ABC}"), 0.4)
     assert word(rack, "FAULTS%") == table.ROTATION
     either = SPEED_LOOP.replace("130 CCLK@", "125 COMMON ANY@\n130 ANY@ = TRUE\n132 CCLK@")
     folder = tmp_path / "either"
@@ -174,9 +178,7 @@ def test_a_line_of_the_other_rotation_is_a_fault_unless_the_drive_may_take_eithe
     rack = built(folder, either, plant="line: {rotation: ABC}", points="  ANY@: {slot: 10, register: 100, bit: 6}\n")
     rack.start()
     rack.run(0.4)
-    rack.write("FRESET@", True)
-    rack.run(0.02)
-    rack.write("FRESET@", False)
+    reset(rack)
     rack.write("WANT@", True)
     rack.run(0.4)
     rack.write("SREF%", 800)
@@ -199,13 +201,9 @@ def test_stop_all_stops_the_drive_and_leaves_feedback_and_status(tmp_path):
     rack.run(0.01)
     assert word(rack, "FAULTS%") == table.COMMUNICATION
     assert not rack.value("RUNNING@")
-    rack.write("FRESET@", True)
-    rack.run(0.02)
-    rack.write("FRESET@", False)
+    reset(rack)
     assert word(rack, "FAULTS%") == 0
-    rack.write("WANT@", True)
-    rack.run(0.4)
-    assert rack.value("RUNNING@")
+    assert runs(rack)
 
 
 def test_a_power_cycle_stops_the_drive_which_stays_locked_to_its_line(tmp_path):
@@ -232,18 +230,14 @@ def test_a_task_that_is_stopped_stops_its_drive(tmp_path):
 
 
 def test_without_the_common_clock_the_status_says_so_and_nothing_comes(tmp_path):
-    rack = built(tmp_path, SPEED_LOOP.replace("130 CCLK@ = TRUE\n", ""))
-    rack.start()
-    rack.run(0.4)
+    rack = run_for(built(tmp_path, SPEED_LOOP.replace("130 CCLK@ = TRUE\n", "")), 0.4)
     assert rack.value("LINK%") == table.NO_CLOCK
     assert (rack.value("COUNT%"), rack.value("STATUS%")) == (0, 0)
     rack.write("CCLK@", True)
     rack.run(0.0201)
     assert rack.value("LINK%") == 0
     assert rack.value("COUNT%") == 10
-    rack.write("WANT@", True)
-    rack.run(0.4)
-    assert rack.value("RUNNING@")
+    assert runs(rack)
     rack.write("CCLK@", False)
     rack.run(0.05)
     assert rack.value("LINK%") == table.NO_CLOCK
@@ -251,8 +245,7 @@ def test_without_the_common_clock_the_status_says_so_and_nothing_comes(tmp_path)
 
 
 def test_messages_are_counted_to_32000_and_counters_of_rails_reset(tmp_path):
-    rack = built(tmp_path)
-    rack.start()
+    rack = run_for(built(tmp_path))
     rack.write("BADBITS%", 12)
     rack.run(0.05)
     assert (rack.value("COUNT%"), rack.value("BADBITS%")) == (25, 12)
@@ -323,11 +316,7 @@ def test_both_drives_have_registers_and_currents_of_their_own(tmp_path):
     (tmp_path / "IDLE.BLK").write_text(IDLE)
     (tmp_path / "WIND_A.BLK").write_text(ONE_TASK)
     (tmp_path / "rack.yaml").write_text(BOTH)
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
-    rack.start()
-    rack.run(0.4)
+    rack = run_for(rack_at(tmp_path / "rack.yaml"), 0.4)
     rack.write("RUN_A@", True)
     rack.write("RUN_B@", True)
     rack.write("REF_A%", 2730)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Task
+from rack.helpers import Observer, rack_at
 
 HEAD = """\
 rack: PM1
@@ -38,12 +38,10 @@ def written(folder: Path, points: str, *, tasks: str = BOTH, top: str = "", more
 
 def built(folder: Path, points: str, **more: str) -> Rack:
     """Return the rack, not started."""
-    result = load(written(folder, points, **more))
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_at(written(folder, points, **more))
 
 
-class Seen:
+class Seen(Observer):
     """What an observer is told: writes, and scans with their instants."""
 
     def __init__(self, rack: Rack) -> None:
@@ -63,11 +61,12 @@ class Seen:
             if not spec.is_array:
                 self.writes.append((item.time_ns, spec.name, item.value))
 
-    def tuned(self, task: Task, now_ns: int) -> None:
-        """Nothing is tuned."""
-
     def operated(self, operation: Operation) -> None:
         self.operations.append(operation)
+
+    def start(self) -> Seen:
+        self.rack.start()
+        return self
 
     def of(self, name: str) -> list[tuple[int, int | float | bool]]:
         """Return the writes of one common: instants in us, values."""

@@ -10,7 +10,7 @@ from automax_ros.drive.base.nameplate import NamePlate
 from automax_ros.drive.circuit.ac_line import Rotation
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.plants import PlantConfig
-from rack.helpers import good, loaded
+from rack.helpers import good, loaded, run_for
 
 HEAD = """\
 rack: LINE1
@@ -144,8 +144,7 @@ def test_a_rack_makes_its_plants_as_the_file_says(tmp_path):
 
 def test_a_rack_goes_on_from_its_state_with_its_plants(tmp_path):
     config = good(tmp_path, PLANTS)
-    whole = Rack(config)
-    whole.start()
+    whole = run_for(Rack(config))
     for seconds in (0.013, 0.3):
         whole.run(seconds)
         if seconds < 0.1:

@@ -5,16 +5,15 @@ from pathlib import Path
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import Installation
-from automax_ros.rackfile.loader import load, load_stored
+from automax_ros.rackfile.loader import load_stored
 from automax_ros.rackfile.model.config import RackConfig
+from rack.helpers import config_at, run_for
 
 CONFIG = Path(__file__).parents[3] / "config" / "section_drive" / "rack.yaml"
 
 
 def config() -> RackConfig:
-    found = load(CONFIG).config
-    assert found is not None
-    return found
+    return config_at(CONFIG)
 
 
 def image_after(rack: Rack, seconds: float) -> list[object]:
@@ -36,8 +35,7 @@ def test_racks_of_one_installation_know_nothing_of_each_other():
 def test_a_source_that_one_rack_reloads_is_not_that_of_the_next():
     found = config()
     template = Installation(found)
-    rack = Rack(found, installation=template.again(found))
-    rack.start()
+    rack = run_for(Rack(found, installation=template.again(found)))
     source = template.sources["LINE"]
     other = SourceText(source.name, source.text + "\n")
     rack.operations.stop("LINE")

@@ -7,23 +7,17 @@ import pytest
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.scheduled_task import ScanEnd
 from automax_ros.runtime.tasks.task import OVERLAP
-from rack.helpers import HEAD, good
+from rack.helpers import HEAD, Observer, good
 
 
-class Told:
-    """An observer that keeps of what it is told what these tests ask for."""
+class Told(Observer):
+    """Keeps the scans."""
 
     def __init__(self):
         self.scans = []
 
     def scanned(self, task, record, writes):
         self.scans.append((task.name, record.scan, [group.changes for group in writes]))
-
-    def written(self, writes): ...
-
-    def tuned(self, task, now_ns): ...
-
-    def operated(self, operation): ...
 
 
 @pytest.fixture

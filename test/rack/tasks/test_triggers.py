@@ -7,18 +7,23 @@ import pytest
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.triggers import Timeout
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
+from rack.helpers import rack_at, run_for
 
 MS = 1_000_000
 KEY = EventKey(EventClass.SCAN, 5, "TASK")
 IO = EventKey(EventClass.IO, 0, "MODULE")
 
 
-def test_a_time_runs_from_its_beginning_and_no_further_than_its_end():
+def timed(timeout_ns: int) -> tuple[Scheduler, Timeout, list[int]]:
+    """A timeout, and the instants at which it has expired."""
     scheduler, expired = Scheduler(), []
-    timeout = Timeout(100, KEY, scheduler, lambda: expired.append(scheduler.now_ns))
+    return scheduler, Timeout(timeout_ns, KEY, scheduler, lambda: expired.append(scheduler.now_ns)), expired
+
+
+def test_a_time_runs_from_its_beginning_and_no_further_than_its_end():
+    scheduler, timeout, expired = timed(100)
     timeout.begin(7)
     scheduler.run_until(107)
     assert expired == []
@@ -32,8 +37,7 @@ def test_a_time_runs_from_its_beginning_and_no_further_than_its_end():
 
 
 def test_what_comes_at_the_last_instant_is_in_time():
-    scheduler, expired = Scheduler(), []
-    timeout = Timeout(100, KEY, scheduler, lambda: expired.append(scheduler.now_ns))
+    scheduler, timeout, expired = timed(100)
     scheduler.at(100, IO, timeout.begin)
     timeout.begin(0)
     scheduler.run_until(500)
@@ -42,8 +46,7 @@ def test_what_comes_at_the_last_instant_is_in_time():
 
 def test_a_host_that_is_late_lets_no_time_run_out():
     """Interrupts each 40 ns with 60 ns of time: a call 200 ns late carries out the last of them alone."""
-    scheduler, expired = Scheduler(), []
-    timeout = Timeout(60, KEY, scheduler, lambda: expired.append(scheduler.now_ns))
+    scheduler, timeout, expired = timed(60)
     interrupts = scheduler.every(40, 40, IO, lambda now, _: timeout.begin(now))
     timeout.begin(0)
     for now in (45, 245, 250, 290):
@@ -58,8 +61,7 @@ def test_a_host_that_is_late_lets_no_time_run_out():
 
 def test_after_a_long_delay_of_the_host_the_time_begins_again():
     """What interrupts may end only after the call that was late: a scan in modeled execution that is under way."""
-    scheduler, expired = Scheduler(), []
-    timeout = Timeout(5 * NS_PER_MS, KEY, scheduler, lambda: expired.append(scheduler.now_ns))
+    scheduler, timeout, expired = timed(5 * NS_PER_MS)
     timeout.begin(0)
     scheduler.run_due(20 * NS_PER_MS)
     scheduler.run_due(25 * NS_PER_MS - 1)
@@ -77,9 +79,7 @@ def rack_of(tmp_path, execution: str = "ideal", **tasks: tuple[int, str]) -> Rac
         f"rack: R\nexecution: {execution}\nslots:\n  0: {{module: 57C435, tick_ms: 1.0, tasks: {{{listed}}}}}\n"
         "  6: {module: 57C411}\ncommon:\n  ISCR%: {slot: 6, register: 3}\n  SEEN%: {}\n  ORDER%(9): {}\n  NEXT%: {}\n"
     )
-    result = load(tmp_path / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_at(tmp_path / "rack.yaml")
 
 
 WAITING = """\
@@ -107,9 +107,7 @@ SETTING = """\
 @pytest.mark.parametrize("execution", ["ideal", "modeled"])
 def test_a_scan_that_an_event_starts_does_not_begin_inside_the_one_that_sets_it(tmp_path, execution):
     """In ideal execution; in modeled execution a higher priority suspends the task right after its SET."""
-    rack = rack_of(tmp_path, execution, SETTER=(8, SETTING), WAITER=(4, WAITING.format(digit=7)))
-    rack.start()
-    rack.run(0.004)
+    rack = run_for(rack_of(tmp_path, execution, SETTER=(8, SETTING), WAITER=(4, WAITING.format(digit=7))), 0.004)
     expected = {"ideal": [1, 2, 7], "modeled": [1, 7, 2]}[execution]
     assert [rack.value("ORDER%", element) for element in range(3)] == expected
     assert (rack.value("SEEN%"), rack.task("WAITER").scan_number) == (1, 1)
@@ -117,9 +115,7 @@ def test_a_scan_that_an_event_starts_does_not_begin_inside_the_one_that_sets_it(
 
 def test_tasks_that_wait_for_one_event_scan_in_the_order_of_priority_and_name(tmp_path):
     tasks = {"C": (6, WAITING.format(digit=3)), "B": (6, WAITING.format(digit=4)), "A": (9, WAITING.format(digit=5))}
-    rack = rack_of(tmp_path, SETTER=(8, SETTING), **tasks)
-    rack.start()
-    rack.run(0.004)
+    rack = run_for(rack_of(tmp_path, SETTER=(8, SETTING), **tasks), 0.004)
     assert [rack.value("ORDER%", element) for element in range(5)] == [1, 2, 4, 3, 5]
 
 
@@ -127,9 +123,7 @@ def test_an_event_that_comes_while_its_scan_is_under_way_is_an_overlap(tmp_path)
     """Decision; the clock's rule of J2-3106-1 p. C-1 for events too."""
     remarks = "".join(f"{number} ! takes 9.88 us\n" for number in range(100, 700))
     slow = WAITING.format(digit=7).replace("70 END", f"{remarks}900 END")
-    rack = rack_of(tmp_path, "modeled", SETTER=(4, SETTING), WAITER=(8, slow))
-    rack.start()
-    rack.run(0.02)
+    rack = run_for(rack_of(tmp_path, "modeled", SETTER=(4, SETTING), WAITER=(8, slow)), 0.02)
     stopped = rack.operations.stopped
     assert stopped is not None
     assert (stopped.code, stopped.task) == ("14", "WAITER")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import pytest
 from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
@@ -75,36 +76,28 @@ def test_a_higher_priority_suspends_a_lower_one_that_goes_on_after_it():
     assert (low.ended, high.ended) == ([(62, 0)], [(37, 0)])
 
 
-def test_equals_wait_for_each_other_in_alphabetical_order():
-    """Z runs when A and B become due: it is not suspended, and A goes first after it though B was due first."""
-    jobs = [(Job("Z", 6, (10,)), 0, 1000), (Job("B", 6, (4,)), 3, 1000), (Job("A", 6, (4,)), 5, 1000)]
-    rig = Rig(*jobs)
+@pytest.mark.parametrize(
+    ("jobs", "steps"),
+    [
+        # Z runs when A and B become due: it is not suspended, and A goes first after it though B was due first.
+        ([("Z", 6, 10, 0), ("B", 6, 4, 3), ("A", 6, 4, 5)], [(10, "Z", 1), (14, "A", 1), (18, "B", 1)]),
+        # One that was suspended goes on before an equal that became due meanwhile.
+        ([("Z", 6, 10, 0), ("HIGH", 4, 5, 3), ("A", 6, 2, 4)], [(8, "HIGH", 1), (15, "Z", 1), (17, "A", 1)]),
+        ([("C", 9, 9, 0), ("B", 7, 9, 3), ("A", 5, 9, 6)], [(15, "A", 1), (21, "B", 1), (27, "C", 1)]),
+    ],
+    ids=["equals in alphabetical order", "suspended before equal", "three levels"],
+)
+def test_jobs_of_one_step_end_in_their_order(jobs, steps):
+    rig = Rig(*((Job(name, priority, (cost,)), due, 1000) for name, priority, cost, due in jobs))
     rig.scheduler.run_until(100)
-    assert [moment for moment in rig.moments if moment[2]] == [(10, "Z", 1), (14, "A", 1), (18, "B", 1)]
-
-
-def test_one_that_was_suspended_goes_on_before_an_equal_that_became_due_meanwhile():
-    rig = Rig((Job("Z", 6, (10,)), 0, 1000), (Job("HIGH", 4, (5,)), 3, 1000), (Job("A", 6, (2,)), 4, 1000))
-    rig.scheduler.run_until(100)
-    assert [moment for moment in rig.moments if moment[2]] == [(8, "HIGH", 1), (15, "Z", 1), (17, "A", 1)]
-
-
-def test_three_levels_suspend_each_other():
-    rig = Rig((Job("C", 9, (9,)), 0, 1000), (Job("B", 7, (9,)), 3, 1000), (Job("A", 5, (9,)), 6, 1000))
-    rig.scheduler.run_until(100)
-    assert [moment for moment in rig.moments if moment[2]] == [(15, "A", 1), (21, "B", 1), (27, "C", 1)]
+    assert [moment for moment in rig.moments if moment[2]] == steps
 
 
 def test_a_job_that_ends_exactly_when_it_is_due_again_has_ended():
     rig = Rig((Job("A", 5, (4, 6)), 0, 10))
     rig.scheduler.run_until(31)
     assert rig.overlaps == []
-    assert [moment for moment in rig.moments if moment[2] == 0] == [
-        (0, "A", 0),
-        (10, "A", 0),
-        (20, "A", 0),
-        (30, "A", 0),
-    ]
+    assert [moment for moment in rig.moments if moment[2] == 0] == [(due, "A", 0) for due in (0, 10, 20, 30)]
 
 
 def test_one_ns_more_is_an_overlap():

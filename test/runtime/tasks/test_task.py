@@ -9,6 +9,7 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.scan.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.runtime.tasks.task import Status
+from runtime.drives import finished
 
 COUNTING = """10 LOCAL N%, OUT%, STARTS%
 20 STARTS% = STARTS% + 1
@@ -58,17 +59,6 @@ RECORDED = """10 COMMON IN%, OUT%, T%(3), LATE!
 """
 
 
-def outcome(steps, times=()):
-    """What a modeled scan returns; it is sent the times one after the other, then None."""
-    sent = iter(times)
-    try:
-        next(steps)
-        while True:
-            steps.send(next(sent, None))
-    except StopIteration as end:
-        return end.value
-
-
 @pytest.mark.parametrize("in_steps", [False, True])
 def test_a_record_has_all_that_a_scan_saw_and_did(in_steps):
     task, memory = task_of(RECORDED, **{"IN%": 7})
@@ -76,7 +66,7 @@ def test_a_record_has_all_that_a_scan_saw_and_did(in_steps):
     start = task.run(5)
     assert (start.time_ns, start.scan, start.latched, start.reads) == (5, 0, (), [(0, 0, 7)])
     memory.keep_log()
-    record = outcome(task.scan_modeled(9, skipped=3)) if in_steps else task.scan(9, skipped=3)
+    record = finished(task.scan_modeled(9, skipped=3)) if in_steps else task.scan(9, skipped=3)
     assert (record.time_ns, record.scan, record.skipped) == (9, 1, 3)
     assert record.latched == (7, 0, 0)
     assert record.reads == [(0, 0, 7), (3, 0, 0), (2, 1, 7), (0, 0, 7)]
@@ -89,7 +79,7 @@ def test_a_record_has_all_that_a_scan_saw_and_did(in_steps):
     ]
 
 
-def test_records_are_of_one_scan_each_and_can_be_ended():
+def test_records_are_of_one_scan_each_and_may_begin_and_end_while_a_task_runs():
     task, _ = task_of(RECORDED, **{"IN%": 7})
     task.record_scans()
     task.run()
@@ -97,14 +87,15 @@ def test_records_are_of_one_scan_each_and_can_be_ended():
     assert (first.scan, second.scan, second.commits) == (1, 2, [])
     task.record_scans(on=False)
     assert task.scan(3) is None
-    assert task.scan_number == 3
+    task.record_scans()
+    assert task.scan(4).scan == task.scan_number == 4
 
 
 def test_times_that_a_modeled_scan_is_sent_are_those_of_its_writes():
     task, memory = task_of(RECORDED, **{"IN%": 7})
     memory.keep_log()
     task.run()
-    outcome(task.scan_modeled(100), range(110, 1000, 10))
+    finished(task.scan_modeled(100), range(110, 1000, 10))
     assert [entry.time_ns for entry in memory.drain()] == [140, 170]
 
 
@@ -297,13 +288,3 @@ def test_a_task_goes_on_after_a_scan_was_interrupted():
     assert (task.value("N%"), memory.read_now(memory.view("OUT%"))) == (3, 2)
     task.scan(4)
     assert (task.value("N%"), memory.read_now(memory.view("OUT%"))) == (4, 4)
-
-
-def test_records_may_begin_and_end_while_a_task_runs():
-    task, _ = task_of(COUNTING)
-    run_scans(task, 2)
-    task.record_scans()
-    assert task.scan(3).scan == 3
-    task.record_scans(on=False)
-    assert task.scan(4) is None
-    assert task.value("N%") == 4

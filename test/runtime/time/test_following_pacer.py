@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rack.helpers import Observer, config_at
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.time.following_pacer import LONGEST_JUMP_NS, FollowingPacer
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
@@ -118,7 +118,7 @@ def told(writes):
     return tuple(str(entry) for group in writes for entry in group.entries())
 
 
-class Log:
+class Log(Observer):
     """All scans of a rack with what they wrote."""
 
     def __init__(self) -> None:
@@ -130,17 +130,10 @@ class Log:
     def written(self, writes):
         self.scans.append(told(writes))
 
-    def tuned(self, *_):
-        pass
-
-    operated = tuned
-
 
 @pytest.fixture
 def config():
-    found = load(TYPES).config
-    assert found is not None
-    return found
+    return config_at(TYPES)
 
 
 def followed(config, step_ns, settings):

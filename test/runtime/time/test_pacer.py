@@ -8,32 +8,17 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from rack.helpers import rack_at
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.time.pacer import LONGEST_WAIT_NS, START_LEAD_NS, Pacer
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
+from runtime.time.walls import Wall
 
 ROOT = Path(__file__).parents[3]
 TYPES = ROOT / "test" / "system" / "racks" / "types" / "rack.yaml"
 PERIOD_NS = 5 * NS_PER_MS
 KEY = EventKey(EventClass.SCAN, 4, "T")
-
-
-class Wall:
-    """A wall clock that moves when somebody waits, or when told to."""
-
-    def __init__(self) -> None:
-        self.now_ns = 1_000_000_007
-        self.waits: list[float] = []
-
-    def __call__(self) -> int:
-        return self.now_ns
-
-    def wait(self, seconds: float) -> None:
-        self.waits.append(seconds)
-        self.now_ns += round(seconds * NS_PER_S)
 
 
 @pytest.fixture
@@ -48,9 +33,14 @@ def scans():
 
 
 @pytest.fixture
-def pacer(wall, scans):
-    scheduler = Scheduler()
-    scheduler.every(PERIOD_NS, 0, KEY, lambda now, skipped: scans.append((now, skipped)))
+def scheduler(scans):
+    made = Scheduler()
+    made.every(PERIOD_NS, 0, KEY, lambda now, skipped: scans.append((now, skipped)))
+    return made
+
+
+@pytest.fixture
+def pacer(scheduler, wall):
     return Pacer(scheduler, clock=wall, wait=wall.wait)
 
 
@@ -99,11 +89,10 @@ def test_deadlines_missed_before_the_end_are_counted(pacer, wall, scans):
     assert scans == [(30 * NS_PER_MS, 6)]
 
 
-def test_wait_that_returns_early_changes_nothing(wall, scans):
+def test_wait_that_returns_early_changes_nothing(scheduler, wall, scans):
     """As when a message comes: the loop waits for the rest."""
-    scheduler = Scheduler()
-    scheduler.every(PERIOD_NS, 0, KEY, lambda now, skipped: scans.append((now, skipped)))
-    Pacer(scheduler, clock=wall, wait=lambda seconds: wall.wait(min(seconds, 0.0011))).run(50 * NS_PER_MS)
+    wait = lambda seconds: wall.wait(min(seconds, 0.0011))  # noqa: E731
+    Pacer(scheduler, clock=wall, wait=wait).run(50 * NS_PER_MS)
     assert scans == [(number * PERIOD_NS, 0) for number in range(10)]
 
 
@@ -138,20 +127,17 @@ def test_on_idle_is_called_every_tenth_of_a_second(pacer):
     assert idle == [0, 100 * NS_PER_MS, 200 * NS_PER_MS, 300 * NS_PER_MS]
 
 
-def test_scheduler_with_a_past_goes_on_from_its_present(wall, scans):
+def test_scheduler_with_a_past_goes_on_from_its_present(scheduler, pacer, scans):
     """A rack may first run in simulated time, then in real time."""
-    scheduler = Scheduler()
-    scheduler.every(PERIOD_NS, 0, KEY, lambda now, skipped: scans.append((now, skipped)))
     scheduler.run_until(10 * NS_PER_S)
     scans.clear()
-    pacer = Pacer(scheduler, clock=wall, wait=wall.wait)
     pacer.run(10 * NS_PER_S + 12 * NS_PER_MS)
     assert scans == [(10 * NS_PER_S + number * PERIOD_NS, 0) for number in range(3)]
 
 
 def test_rack_on_a_made_up_clock_is_the_simulated_rack(wall):
     """The same scans and values, since a host that is never late lets every event happen at its own instant."""
-    racks = [Rack(load(TYPES).config) for _ in range(2)]
+    racks = [rack_at(TYPES) for _ in range(2)]
     for rack in racks:
         rack.start([("REF%", 12)])
     Pacer(racks[0].scheduler, clock=wall, wait=wall.wait).run(200 * NS_PER_MS)

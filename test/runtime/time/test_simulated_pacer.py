@@ -10,23 +10,9 @@ from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.runtime.time.pacer import BREATH_S, LONGEST_WAIT_NS
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 from automax_ros.runtime.time.simulated_pacer import LEAST_TICK_NS, MOST_LATE_NS, MOST_TICK_NS, SimulatedPacer
+from runtime.time.walls import Wall
 
 KEY = EventKey(EventClass.SCAN, 4, "T")
-
-
-class Wall:
-    """A wall clock that moves when somebody waits."""
-
-    def __init__(self) -> None:
-        self.now_ns = 1_000_000_007
-        self.waits: list[float] = []
-
-    def __call__(self) -> int:
-        return self.now_ns
-
-    def wait(self, seconds: float) -> None:
-        self.waits.append(seconds)
-        self.now_ns += round(seconds * NS_PER_S)
 
 
 def made(period_ns, *, rate=None, wall=None, cost_ns=0):
