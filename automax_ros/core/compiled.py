@@ -189,7 +189,6 @@ def _folders(package: str) -> tuple[str, ...]:
 
 
 def _harmed(file: str, size: int) -> str:
-    """Return why a library is not as it was built; empty if it is."""
     try:
         found = os.path.getsize(file)
     except OSError:
@@ -198,7 +197,6 @@ def _harmed(file: str, size: int) -> str:
 
 
 def _changed(package: str, file: str, digest: str) -> str:
-    """Return why a source is not as it was compiled; empty if it is."""
     try:
         with open(os.path.join(package, file), "rb") as source:
             content = source.read()

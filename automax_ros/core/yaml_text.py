@@ -138,7 +138,6 @@ class _Places:
         self._starts = [0, *(end.end() for end in _LINE_END.finditer(text))]
 
     def span(self, start: int, end: int) -> Span:
-        """Return the span between two indices, truncated at the end of its first line."""
         start = min(start, self._length)
         line = bisect_right(self._starts, start)
         begin = self._starts[line - 1]

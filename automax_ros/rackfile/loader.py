@@ -8,22 +8,31 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
-from automax_ros.core.json_schema import Keys, Schema, document, flag, named, number, section, words
+from automax_ros.core.json_schema import Keys, Schema, document, named, section
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, read_yaml
 from automax_ros.rackfile.model.config import CommonVariable, ModuleLoss, RackConfig, Timing, bank_variables
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.ros_names import namespace
-from automax_ros.rackfile.reading.executive import NEWEST, OLDEST, executive_value
+from automax_ros.rackfile.reading.executive import EXECUTIVE, NEWEST
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.rackfile.reading.names import RACK_NAME, is_rack_name
-from automax_ros.rackfile.reading.values import ProblemList, Section, boolean_value, entries_of, text_value
+from automax_ros.rackfile.reading.values import (
+    Key,
+    ProblemList,
+    Section,
+    choice_key,
+    entries_of,
+    flag_key,
+    schemas,
+    text_value,
+)
 from automax_ros.rackfile.sections.commons import SCHEMA as COMMON_SCHEMA
 from automax_ros.rackfile.sections.commons import CommonReader
 from automax_ros.rackfile.sections.feeds import read_feeds
 from automax_ros.rackfile.sections.joints import read_commands
 from automax_ros.rackfile.sections.plants import SCHEMA as PLANTS_SCHEMA
-from automax_ros.rackfile.sections.plants import Plants, read_plants
+from automax_ros.rackfile.sections.plants import read_plants
 from automax_ros.rackfile.sections.tasks import TaskReader
 from automax_ros.rackfile.sections.watch import SCHEMA as WATCH_SCHEMA
 from automax_ros.rackfile.sections.watch import read_watch
@@ -31,19 +40,41 @@ from automax_ros.rackfile.slots import SCHEMA as SLOTS_SCHEMA
 from automax_ros.rackfile.slots import SlotReader
 
 _START = Span(1, 1, 2)
-_NAME = re.compile(r"""^rack[ ]*:[ ]*(?:["']?)(\w{1,8})(?:["']?)[ ]*(?:#.*)?$""", re.MULTILINE)
-_TIMINGS, _LOSSES = [timing.value for timing in Timing], [loss.value for loss in ModuleLoss]
+_NAME_LINE = re.compile(r"""^rack[ ]*:[ ]*(?:["']?)(\w{1,8})(?:["']?)[ ]*(?:#.*)?$""", re.MULTILINE)
+_TIMINGS, _LOSSES = {timing.value: timing for timing in Timing}, {loss.value: loss for loss in ModuleLoss}
+
+
+def _name(node: Node, _: str, findings: ProblemList) -> str | None:
+    text = text_value(node, "the rack's name", findings, limit=100)
+    name = findings.upper_case(text, node.span) if text is not None else None
+    if text is None or name is None or is_rack_name(name):
+        return name
+    hint = "for example LINE1: no blank, hyphen or underscore"
+    findings.add("AMX6100", f"{quoted(text)}: a rack's name has 1 to 8 letters and digits", node.span, hint)
+    return None
+
+
+_NAME = Key("rack", named("The rack's name; in lower case its ROS 2 namespace.", RACK_NAME), _name)
+_OPERATOR = flag_key("operator", "Whether the running rack has services that operate it.")
+_EXECUTION = choice_key(
+    "execution",
+    "`ideal`: a scan takes no time; `modeled`: the time that the manual prints.",
+    _TIMINGS,
+    ("AMX6430", "{given} is not a way of execution"),
+    lambda _: "write ideal (a scan takes no time) or modeled (it takes the manual's time)",
+    "ideal",
+)
+_AUTO_RUN = flag_key("auto_run", "AUTO RUN: whether a power cycle ends with the tasks in RUN that ran before it.")
+_MODULE_LOSS = choice_key(
+    "on_module_loss",
+    "What a rack of several processes does when it loses one.",
+    _LOSSES,
+    ("AMX6704", f"{{what}} is {{given}}; it must be {' or '.join(_LOSSES)}"),
+    lambda word: did_you_mean(word, _LOSSES),
+    "stop_all",
+)
 KEYS: Keys = {
-    "rack": named("The rack's name; in lower case its ROS 2 namespace.", RACK_NAME),
-    "operator": flag("Whether the running rack has services that operate it.", False),
-    "execution": words(
-        "`ideal`: a scan takes no time; `modeled`: the time that the manual prints.",
-        _TIMINGS,
-        "ideal",
-    ),
-    "executive": number("Version of the AutoMax Programming Executive.", OLDEST / 10, NEWEST / 10, NEWEST / 10),
-    "auto_run": flag("AUTO RUN: whether a power cycle ends with the tasks in RUN that ran before it.", False),
-    "on_module_loss": words("What a rack of several processes does when it loses one.", _LOSSES, "stop_all"),
+    **schemas(_NAME, _OPERATOR, _EXECUTION, EXECUTIVE, _AUTO_RUN, _MODULE_LOSS),
     "slots": SLOTS_SCHEMA,
     "plants": PLANTS_SCHEMA,
     "common": COMMON_SCHEMA,
@@ -75,7 +106,7 @@ class LoadResult:
         """
         if self.config is not None:
             return self.config.namespace
-        found = _NAME.search(self.source.text)
+        found = _NAME_LINE.search(self.source.text)
         name = found[1].upper() if found is not None else ""
         return namespace(name) if is_rack_name(name) else None
 
@@ -103,7 +134,7 @@ def load_stored(source: SourceText, path: Path) -> LoadResult:
 
 def _loaded(source: SourceText, tasks: TaskReader, path: Path, findings: ProblemList) -> LoadResult:
     root = read_yaml(source.text, findings.yaml_flaw) if not findings.errors else None
-    config = _RackReader(path, source.text, tasks, findings).read(root) if root is not None else None
+    config = _read_rack(root, source.text, tasks, path, findings) if root is not None else None
     return LoadResult(config if not findings.errors else None, findings.in_order(), source)
 
 
@@ -124,113 +155,55 @@ def _text_of(path: Path, findings: ProblemList) -> str:
         return data.decode(errors="replace")
 
 
-class _RackReader:
-    def __init__(self, path: Path, text: str, tasks: TaskReader, findings: ProblemList) -> None:
-        self._path = path
-        self._text = text
-        self._findings = findings
-        self._tasks = tasks
+def _read_rack(root: Node, text: str, tasks: TaskReader, path: Path, findings: ProblemList) -> RackConfig | None:
+    entries = entries_of(root, "a rack file", findings)
+    if entries is None:
+        return None
+    section = Section(entries, "a rack file", KEYS, findings, owner="")
+    section.require(_REQUIRED, "the rack file", _START, findings)
+    name = section.read(_NAME)
+    operator, auto_run = bool(section.read(_OPERATOR)), bool(section.read(_AUTO_RUN))
+    loss = section.read(_MODULE_LOSS) or ModuleLoss.STOP_ALL
+    execution = section.read(_EXECUTION) or Timing.IDEAL
+    executive = section.read(EXECUTIVE) or NEWEST
+    plants = read_plants(section.get("plants"), findings)
+    slots, common, watch = section.get("slots"), section.get("common"), section.get("watch")
+    reader = SlotReader(tasks, findings, executive, plants)
+    modules = reader.read(slots, section.key_span("slots")) if slots is not None else ()
+    variables = CommonReader(modules, findings, reader.unread).read(common) if common is not None else ()
+    if common is not None:
+        _check_size(variables, modules, section.key_span("common"), findings)
+    feeds = read_feeds(plants.feeds, variables, modules, findings)
+    commands = read_commands(plants.joints, variables, findings)
+    everything = (*variables, *bank_variables(modules))
+    shown = read_watch(watch, everything, findings) if watch is not None else None
+    if name is None or findings.errors:
+        return None
+    return RackConfig(
+        name=name,
+        namespace=namespace(name),
+        path=path,
+        text=text,
+        operator=operator,
+        modules=modules,
+        variables=everything,
+        execution=execution,
+        executive=executive,
+        auto_run=auto_run,
+        on_module_loss=loss,
+        plants=tuple(plants.known.values()),
+        feeds=feeds,
+        joint_commands=commands,
+        watch=shown,
+    )
 
-    def read(self, root: Node) -> RackConfig | None:
-        entries = entries_of(root, "a rack file", self._findings)
-        if entries is None:
-            return None
-        section = Section(entries, "a rack file", KEYS, self._findings)
-        section.require(_REQUIRED, "the rack file", _START, self._findings)
-        name = self._name(section.get("rack"))
-        operator = self._flag(section, "operator")
-        auto_run = self._flag(section, "auto_run")
-        loss = self._module_loss(section.get("on_module_loss"))
-        execution = self._execution(section.get("execution"))
-        executive = self._executive(section.get("executive"))
-        plants = read_plants(section.get("plants"), self._findings)
-        modules, unread = self._modules(section, executive, plants)
-        common = section.get("common")
-        variables = CommonReader(modules, self._findings, unread).read(common) if common is not None else ()
-        if common is not None:
-            self._check_size(variables, modules, section.key_span("common"))
-        feeds = read_feeds(plants.feeds, variables, modules, self._findings)
-        commands = read_commands(plants.joints, variables, self._findings)
-        everything = (*variables, *bank_variables(modules))
-        watch = section.get("watch")
-        shown = read_watch(watch, everything, self._findings) if watch is not None else None
-        if name is None or self._findings.errors:
-            return None
-        return RackConfig(
-            name=name,
-            namespace=namespace(name),
-            path=self._path,
-            text=self._text,
-            operator=operator,
-            modules=modules,
-            variables=everything,
-            execution=execution,
-            executive=executive,
-            auto_run=auto_run,
-            on_module_loss=loss,
-            plants=tuple(plants.known.values()),
-            feeds=feeds,
-            joint_commands=commands,
-            watch=shown,
-        )
 
-    def _name(self, node: Node | None) -> str | None:
-        if node is None:
-            return None
-        text = text_value(node, "the rack's name", self._findings, limit=100)
-        if text is None:
-            return None
-        name = self._findings.upper_case(text, node.span)
-        if not is_rack_name(name):
-            hint = "for example LINE1: no blank, hyphen or underscore"
-            self._findings.add(
-                "AMX6100", f"{quoted(text)}: a rack's name has 1 to 8 letters and digits", node.span, hint
-            )
-            return None
-        return name
-
-    def _flag(self, section: Section, key: str) -> bool:
-        node = section.get(key)
-        return bool(node is not None and boolean_value(node, key, self._findings))
-
-    def _execution(self, node: Node | None) -> Timing:
-        text = text_value(node, "execution", self._findings, limit=100) if node is not None else None
-        for timing in Timing:
-            if text == timing.value:
-                return timing
-        if node is not None and text is not None:
-            hint = "write ideal (a scan takes no time) or modeled (it takes the manual's time)"
-            self._findings.add("AMX6430", f"{quoted(text)} is not a way of execution", node.span, hint)
-        return Timing.IDEAL
-
-    def _executive(self, node: Node | None) -> int:
-        return executive_value(node, self._findings) if node is not None else NEWEST
-
-    def _module_loss(self, node: Node | None) -> ModuleLoss:
-        text = text_value(node, "on_module_loss", self._findings, limit=100) if node is not None else None
-        words = [loss.value for loss in ModuleLoss]
-        if node is None or text is None:
-            return ModuleLoss.STOP_ALL
-        if text not in words:
-            message = f"on_module_loss is {quoted(text)}; it must be {' or '.join(words)}"
-            self._findings.add("AMX6704", message, node.span, did_you_mean(text, words))
-            return ModuleLoss.STOP_ALL
-        return ModuleLoss(text)
-
-    def _modules(
-        self, section: Section, executive: int, plants: Plants
-    ) -> tuple[tuple[ModuleConfig, ...], frozenset[int]]:
-        """Return the modules, and the slots of those that could not be read."""
-        node = section.get("slots")
-        if node is None:
-            return (), frozenset()
-        reader = SlotReader(self._tasks, self._findings, executive, plants)
-        return reader.read(node, section.key_span("slots")), reader.unread
-
-    def _check_size(self, variables: tuple[CommonVariable, ...], modules: tuple[ModuleConfig, ...], span: Span) -> None:
-        """Compare the size of the commons with the module that holds them, the first that can (J-3636 p. 1-1)."""
-        holder = next((module for module in modules if module.common_registers), None)
-        needed = sum(variable.registers for variable in variables if variable.point is None)
-        if holder is not None and needed > holder.common_registers:
-            message = f"the common variables take {needed} registers; the {holder.model} has {holder.common_registers}"
-            self._findings.add("AMX6409", message, span)
+def _check_size(
+    variables: tuple[CommonVariable, ...], modules: tuple[ModuleConfig, ...], span: Span, findings: ProblemList
+) -> None:
+    """Compare the size of the commons with the module that holds them, the first that can (J-3636 p. 1-1)."""
+    holder = next((module for module in modules if module.common_registers), None)
+    needed = sum(variable.registers for variable in variables if variable.point is None)
+    if holder is not None and needed > holder.common_registers:
+        message = f"the common variables take {needed} registers; the {holder.model} has {holder.common_registers}"
+        findings.add("AMX6409", message, span)

@@ -72,7 +72,6 @@ def with_numbers(text: str, values: Mapping[PlantNumber, str]) -> str:
 
 
 def _numbers(schema: Schema, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Schema]]:
-    """Yield the numbers below keys with fixed names."""
     if "minimum" in schema:
         yield path, schema
     for choice in schema.get("anyOf", ()):

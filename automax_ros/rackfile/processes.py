@@ -94,8 +94,6 @@ def seat_named(seats: Sequence[RackProcess], text: str) -> RackProcess:
 
 
 class _Bond(NamedTuple):
-    """Modules that must share a process."""
-
     slots: tuple[int, ...]
     reason: str
 
@@ -121,7 +119,6 @@ def _loop_bonds(program: Program, slot: int, names: dict[int, str]) -> Iterator[
 
 
 def _interrupt_bonds(program: Program, slot: int, names: dict[int, str], config: RackConfig) -> Iterator[_Bond]:
-    """Yield the modules whose interrupts set events of a task."""
     for event in program.events:
         variable = config.by_name.get(event.interrupt_status.name) if event.interrupt_status is not None else None
         if variable is not None and variable.point is not None:
@@ -131,8 +128,6 @@ def _interrupt_bonds(program: Program, slot: int, names: dict[int, str], config:
 
 @runtime_checkable
 class _Wired(Protocol):
-    """A module to which a signal of the drive in another slot is wired."""
-
     @property
     def drive(self) -> int | None: ...
 
@@ -153,7 +148,6 @@ def _plant_bonds(config: RackConfig) -> Iterator[_Bond]:
 
 
 def _meeting_bonds(programs: Sequence[Program], homes: dict[str, int]) -> Iterator[_Bond]:
-    """Yield the modules whose tasks share an event or a channel."""
     met: dict[str, list[Program]] = {}
     for program in programs:
         events = [f"the event {event.name}" for event in program.events]

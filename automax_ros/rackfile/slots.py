@@ -95,13 +95,9 @@ class SlotReader:
             return None
         kind = SUPPORTED[model]
         standing = self._standing[slot] = PlacedModule(slot, model, kind, key.span)
-        section = Section(node.entries, _described(standing), ("module", *kind.options), self._findings)
-        where = f"{_described(standing)} in slot {slot}"
-        return kind.read(
-            ModuleSection(
-                slot, model, section, where, key.span, self._tasks, self._findings, self._executive, self._plants
-            )
-        )
+        known, what = ("module", *kind.options), _described(standing)
+        section = Section(node.entries, what, known, self._findings, owner=f"{what} in slot {slot}")
+        return kind.read(ModuleSection(slot, model, section, key.span, self._tasks, self._executive, self._plants))
 
     def _model(self, entries: tuple[Entry, ...], what: str, key: Scalar) -> str | None:
         """Return the number of an emulated module; report AMX6202 to AMX6204 and AMX6211 for others."""

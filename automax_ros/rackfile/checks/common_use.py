@@ -37,8 +37,6 @@ _NAMED = 6
 
 
 class _Write(NamedTuple):
-    """A place where a scan writes a common, and whether it writes the constant TRUE or FALSE."""
-
     task: str
     target: Reference | Element
     line: int
@@ -46,8 +44,6 @@ class _Write(NamedTuple):
 
 
 class _Read(NamedTuple):
-    """A place where a task reads a common."""
-
     task: str
     line: int | None
 
@@ -135,18 +131,15 @@ def _without_plant(config: RackConfig, programs: Mapping[str, Program]) -> Itera
 
 
 def _supplied(config: RackConfig) -> set[str]:
-    """Return the commons that get a value from something other than a task."""
     given = {item.name for item in config.declared if item.direction is Direction.IN or item.preset is not None}
     return given | _connected(config)
 
 
 def _connected(config: RackConfig) -> set[str]:
-    """Return the commons that the rack itself writes, that plants feed, and that joints of robots command."""
     return {*PREDEFINED, *(feed.common for feed in config.feeds), *(item.common for item in config.joint_commands)}
 
 
 def _place(config: RackConfig, line: int) -> Span:
-    """Return the place of the first word in a line of the rack file."""
     text = config.text.split("\n")[line - 1]
     start = len(text) - len(text.lstrip())
     return Span(line, start + 1, start + 1 + len(re.split(r"[\s:]", text[start:])[0]))
@@ -209,7 +202,6 @@ def _outputs(bound: BoundCall) -> Iterator[Reference | Element]:
 
 
 def _reads(program: Program) -> Iterator[tuple[str, int | None]]:
-    """Yield the commons that a task reads, with the line."""
     for bound in program.calls.values():
         outputs = {output.name for output in bound.block.outputs}
         for keyword, value in bound.arguments.items():

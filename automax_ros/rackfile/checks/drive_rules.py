@@ -40,18 +40,14 @@ def drive_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[
 
 @dataclass(frozen=True)
 class _Loop:
-    """A current minor loop task with its module; ``bound`` is its CALL."""
-
     module: ModuleConfig
     task: TaskConfig
     bound: BoundCall
 
     def slot(self, keyword: str) -> int:
-        """Return the slot that an input names."""
         return int(self.bound.facts[keyword.lower()])
 
     def found(self, code: str, message: str, hint: str | None = None, keyword: str = "") -> _Found:
-        """Return a diagnostic at the CALL, or at one of its parameters."""
         given = self.bound.arguments.get(keyword)
         span = self.bound.call.span if given is None else given.span
         return self.task.name, Diagnostic(code, message, span, self.bound.line, hint)
@@ -59,20 +55,16 @@ class _Loop:
 
 @dataclass(frozen=True)
 class _Loops:
-    """The current minor loops of a rack."""
-
     config: RackConfig
     programs: Mapping[str, Program]
 
     @cached_property
     def all(self) -> list[_Loop]:
-        """All of them, by slot, then in the order of the file."""
         found = ((module, task, self.programs.get(task.name)) for module, task in self.config.placed_tasks)
         return [_Loop(module, task, program.cml) for module, task, program in found if program and program.cml]
 
     @cached_property
     def modules(self) -> Mapping[int, ModuleConfig]:
-        """The modules by slot."""
         return {module.slot: module for module in self.config.modules}
 
     def slots(self) -> Iterator[_Found]:

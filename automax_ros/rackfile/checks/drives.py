@@ -100,7 +100,6 @@ def rack_drives(config: RackConfig, programs: Iterable[Program]) -> list[RackDri
 
 
 def _slot_of(program: Program) -> int | None:
-    """Return the slot of the 57C406 that a task's loop commands, None for a task without a loop."""
     slot = program.cml.facts.get(SLOT.lower()) if program.cml is not None else None
     return slot if isinstance(slot, int) else None
 
@@ -196,7 +195,6 @@ def written_constants(program: Program, scope: Scope, start: int | None = None) 
 
 
 def _constants(program: Program, start: int | None) -> dict[str, list[Value | None]]:
-    """Return the values that a task assigns to each simple variable, None for one that is not a constant."""
     found: dict[str, list[Value | None]] = {}
     for statement, _ in statements_in_order((*program.startup, *program.scan)):
         if isinstance(statement, Assignment):
@@ -266,7 +264,6 @@ def _case(
 
 
 def _computing(drive: RackDrive, config: RackConfig) -> Computing | None:
-    """Return how long the scans of a drive's task compute, on its Processor and on the slowest that may run it."""
     program = drive.program
     if program is None:
         return None
@@ -293,11 +290,9 @@ class _Registers:
     programs: Sequence[Program]
 
     def given(self, register: int) -> Given:
-        """Return a register's value."""
         return _of(self._words(register), DEFAULTS[register])
 
     def bit_0(self, register: int) -> Given:
-        """Return whether bit 0 of a register is on."""
         words = [None if word is None else word & 1 for word in self._words(register)]
         return _of([*words, *self._points(register, 0)], DEFAULTS[register] & 1)
 
@@ -306,7 +301,6 @@ class _Registers:
         return [*self._points(register, None), *numbered]
 
     def _points(self, register: int, bit: int | None) -> list[int | None]:
-        """Return the values that tasks write to the points of a register, or of one of its bits."""
         place = Point(self.slot, register, bit)
         names = {variable.name for variable in self.config.declared if variable.point == place}
         written = (

@@ -64,7 +64,6 @@ def _hardware(program: Program) -> list[Event]:
 def _wrong_status(
     event: Event, variable: CommonVariable, modules: Mapping[int, ModuleConfig], rack_file: str
 ) -> Diagnostic | None:
-    """Return a diagnostic of the variable that INTERRUPT_STATUS names, None if it is right."""
     assert event.interrupt_status is not None
     name, span = variable.name, event.interrupt_status.span
     place = f"({rack_file}:{variable.line})"
@@ -96,7 +95,6 @@ def _two_sources(declared: Iterable[_Declared]) -> Iterator[tuple[str, Diagnosti
 
 
 def _too_many(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[tuple[str, Diagnostic]]:
-    """Yield the events beyond those that a Processor's interrupt line serves."""
     for module in config.task_modules:
         present = [task.name for task in module.tasks if task.name in programs]
         events = [(name, item) for name in present for item in _hardware(programs[name])]

@@ -44,8 +44,6 @@ def udc_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[st
 
 @dataclass(frozen=True)
 class _Written:
-    """A common on the UDC that a task writes, and the first place where it does."""
-
     task: str
     variable: CommonVariable
     at: Place
@@ -53,26 +51,21 @@ class _Written:
 
 @dataclass(frozen=True)
 class _Udc:
-    """One UDC with the programs of all tasks of the rack."""
-
     config: RackConfig
     module: UdcConfig
     programs: Mapping[str, Program]
 
     @cached_property
     def own(self) -> list[Program]:
-        """The programs of the UDC, A before B."""
         return [self.programs[task.name] for task in self.module.tasks if task.name in self.programs]
 
     @cached_property
     def points(self) -> dict[str, CommonVariable]:
-        """The commons in its dual port."""
         slot = self.module.slot
         return {item.name: item for item in self.config.declared if item.point is not None and item.point.slot == slot}
 
     @cached_property
     def written(self) -> list[_Written]:
-        """The writes of the UDC's own tasks to them."""
         return [item for program in self.own for item in self._written_by(program)]
 
     def foreign_commons(self) -> Iterator[_Found]:
@@ -199,7 +192,6 @@ def _scan_loop(program: Program) -> BoundCall:
 
 
 def _drive_constants(bound: BoundCall) -> Iterator[tuple[str, str, object]]:
-    """Yield the constants of a CALL that the drive determines: keyword, the drive's parameter, value."""
     for item in bound.block.inputs:
         if not item.drive_parameter:
             continue
@@ -211,14 +203,12 @@ def _drive_constants(bound: BoundCall) -> Iterator[tuple[str, str, object]]:
 
 
 def _taken(variable: CommonVariable) -> range:
-    """Return the registers of a point."""
     assert variable.point is not None
     first = variable.point.register
     return range(first, first + (2 if variable.type in (DataType.DOUBLE, DataType.REAL) else 1))
 
 
 def _bits(variable: CommonVariable) -> Iterable[tuple[int, int]]:
-    """Return the bits of a point, each with its register."""
     assert variable.point is not None
     bits = range(16) if variable.point.bit is None else (variable.point.bit,)
     return [(register, bit) for register in _taken(variable) for bit in bits]

@@ -15,13 +15,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.core.json_schema import Keys, whole
+from automax_ros.core.json_schema import Keys
 from automax_ros.rackfile.model.config import MAX_SLOT
 from automax_ros.rackfile.model.module import Registers
 from automax_ros.rackfile.model.plants import plant_name
 from automax_ros.rackfile.modules.io import IoModel, WithoutTasks
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
-from automax_ros.rackfile.reading.values import integer_value
+from automax_ros.rackfile.reading.values import schemas, whole_key
 
 if TYPE_CHECKING:
     from automax_ros.rackfile.model.plants import PlantConfig
@@ -43,6 +43,7 @@ _REGISTERS = Registers(
 
 
 _ANALOG_REGISTERS = Registers(4, by_itself=True)
+_DRIVE = whole_key("drive", "Slot of the 57C406 whose armature voltage is wired to it.", 0, MAX_SLOT, "AMX6520")
 
 
 @dataclass(frozen=True)
@@ -115,15 +116,11 @@ class DriveAnalogKind:
     word = "drive analog I/O"
     table: Mapping[str, IoModel] = MappingProxyType({"57C405": IoModel("drive analog I/O module", _ANALOG_REGISTERS)})
     models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
-    options: Keys = MappingProxyType(
-        {"drive": whole("Slot of the 57C406 whose armature voltage is wired to it.", 0, MAX_SLOT)}
-    )
+    options: Keys = MappingProxyType(schemas(_DRIVE))
 
     def read(self, found: ModuleSection) -> DriveAnalogConfig:
         """Read the drive to which it is wired."""
-        node = found.section.get("drive")
-        what = f"drive of {found.where}"
-        drive = None if node is None else integer_value(node, what, found.findings, low=0, high=15, code="AMX6520")
+        node, drive = found.section.get("drive"), found.section.read(_DRIVE)
         return DriveAnalogConfig(found.slot, found.model, drive, found.span.line, node.span if node else None)
 
     def check_places(self, rack: RackLayout) -> None:

@@ -8,28 +8,38 @@ from typing import Protocol
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.json_schema import Keys
-from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.model.module import ModuleConfig, TaskConfig
 from automax_ros.rackfile.reading.values import ProblemList, Section
 from automax_ros.rackfile.sections.plants import Plants
-from automax_ros.rackfile.sections.tasks import TaskReader
+from automax_ros.rackfile.sections.tasks import PRIORITIES, TaskPlaces, TaskReader
 
 
 @dataclass(frozen=True)
 class ModuleSection:
-    """The section of a module for its kind to read; ``where`` names the module in messages.
-
-    ``executive`` is the version of the Programming Executive in tenths (``rackfile/reading/executive.py``).
-    """
+    """The section of a module for its kind to read; ``executive`` is the Programming Executive's version in tenths."""
 
     slot: int
     model: str
     section: Section
-    where: str
     span: Span
     tasks: TaskReader
-    findings: ProblemList
     executive: int
     plants: Plants
+
+    @property
+    def where(self) -> str:
+        """The module in messages."""
+        return self.section.owner
+
+    @property
+    def findings(self) -> ProblemList:
+        """The problems of the file."""
+        return self.section.findings
+
+    def read_tasks(self, places: TaskPlaces = PRIORITIES) -> tuple[TaskConfig, ...]:
+        """Return the module's tasks without errors."""
+        node = self.section.get("tasks")
+        return self.tasks.read(node, self.where, places) if node is not None else ()
 
 
 @dataclass(frozen=True)

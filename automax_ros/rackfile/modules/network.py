@@ -23,14 +23,14 @@ from functools import cached_property
 from types import MappingProxyType
 
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.core.json_schema import Keys, named, whole
+from automax_ros.core.json_schema import Keys, named
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Node
 from automax_ros.rackfile.model.module import Registers
 from automax_ros.rackfile.modules.io import WithoutTasks
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 from automax_ros.rackfile.reading.names import RACK_NAME, is_rack_name
-from automax_ros.rackfile.reading.values import ProblemList, integer_value, text_value
+from automax_ros.rackfile.reading.values import Key, ProblemList, integer_value, schemas, text_value, whole_key
 
 AREA = 64
 """Registers of the area of one drop."""
@@ -125,37 +125,49 @@ class NetworkConfig(WithoutTasks):
         return range(self.drop, self.drop + self.depth)
 
 
+def _network_name(node: Node, what: str, findings: ProblemList) -> str | None:
+    text = text_value(node, what, findings, limit=100)
+    name = findings.upper_case(text, node.span) if text is not None else None
+    if text is None or name is None or is_rack_name(name):
+        return name
+    message = f"{what} is {quoted(text)}; a network's name has 1 to 8 letters and digits"
+    findings.add("AMX6560", message, node.span, "for example PAPER, or the letter that the plant's drawings have")
+    return None
+
+
+_NETWORK = Key("network", named("Name of the network that its cable is part of.", RACK_NAME), _network_name)
+_DROP = whole_key("drop", "Its place on the network; 0 is the master.", MASTER, LAST_DROP, "AMX6561")
+_DEPTH = whole_key("depth", "On how many drops, from its own on, its variables may stand.", 1, LAST_DROP, "AMX6561", 1)
+
+
 class NetworkKind:
     """The options of a 57C404 in a rack file."""
 
     word = "network module"
     models: Mapping[str, str] = MappingProxyType({"57C404": "DCS-NET network communications module"})
-    options: Keys = MappingProxyType(
-        {
-            "network": named("Name of the network that its cable is part of.", RACK_NAME),
-            "drop": whole("Its place on the network; 0 is the master.", MASTER, LAST_DROP),
-            "depth": whole("On how many drops, from its own on, its variables may stand.", 1, LAST_DROP, 1),
-        }
-    )
+    options: Keys = MappingProxyType(schemas(_NETWORK, _DROP, _DEPTH))
 
     def read(self, found: ModuleSection) -> NetworkConfig | None:
         """Read network, drop and depth."""
-        section, findings = found.section, found.findings
-        if not section.require(("network", "drop"), found.where, found.span, findings):
+        section = found.section
+        if not section.require(("network", "drop"), found.where, found.span, found.findings):
             return None
-        network, drop = section.get("network"), section.get("drop")
-        assert network is not None
-        assert drop is not None
-        name = _network_name(network, f"network of {found.where}", findings)
-        number = integer_value(drop, f"drop of {found.where}", findings, low=MASTER, high=LAST_DROP, code="AMX6561")
-        if name is None or number is None:
+        network, drop = section.read(_NETWORK), section.read(_DROP)
+        place, node = section.get("drop"), section.get("depth")
+        if network is None or drop is None or place is None:
             return None
-        depth = _depth(section.get("depth"), number, found)
-        return (
-            None
-            if depth is None
-            else NetworkConfig(found.slot, found.model, name, number, depth, found.span.line, drop.span)
-        )
+        depth: int | None = 1
+        if node is not None and drop == MASTER:
+            message = f"{found.where} is the master, drop 0: it has no depth"
+            hint = "depth is how many drops a slave represents: leave it out"
+            found.findings.add("AMX6561", message, node.span, hint)
+            return None
+        if node is not None:
+            what, high = f"depth of {found.where}", greatest_depth(drop)
+            depth = integer_value(node, what, found.findings, low=1, high=high, code="AMX6561")
+        if depth is None:
+            return None
+        return NetworkConfig(found.slot, found.model, network, drop, depth, found.span.line, place.span)
 
     def check_places(self, rack: RackLayout) -> None:
         """Report two modules of the rack that represent one drop of a network (57C570 manual p. 18-7)."""
@@ -170,26 +182,3 @@ class NetworkKind:
 
 
 NETWORK = NetworkKind()
-
-
-def _network_name(node: Node, what: str, findings: ProblemList) -> str | None:
-    text = text_value(node, what, findings, limit=100)
-    if text is None:
-        return None
-    name = findings.upper_case(text, node.span)
-    if not is_rack_name(name):
-        message = f"{what} is {quoted(text)}; a network's name has 1 to 8 letters and digits"
-        findings.add("AMX6560", message, node.span, "for example PAPER, or the letter that the plant's drawings have")
-        return None
-    return name
-
-
-def _depth(node: Node | None, drop: int, found: ModuleSection) -> int | None:
-    if node is None:
-        return 1
-    if drop == MASTER:
-        message = f"{found.where} is the master, drop 0: it has no depth"
-        found.findings.add("AMX6561", message, node.span, "depth is how many drops a slave represents: leave it out")
-        return None
-    high = greatest_depth(drop)
-    return integer_value(node, f"depth of {found.where}", found.findings, low=1, high=high, code="AMX6561")

@@ -21,7 +21,7 @@ from automax_ros.rackfile.model.module import NO_REGISTERS, Registers, TaskConfi
 from automax_ros.rackfile.modules.common_memory import COMMON_MEMORY
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
 from automax_ros.rackfile.reading.executive import OLDEST, tick_fault, version_text
-from automax_ros.rackfile.reading.values import wrong_kind
+from automax_ros.rackfile.reading.values import Key, ProblemList, schemas, wrong_kind
 from automax_ros.rackfile.sections.tasks import PRIORITIES, tasks_schema
 
 MAX_PROCESSORS = 4
@@ -37,6 +37,20 @@ _SLOTS = range(1, 5)
 
 
 NODE = "pc3000"
+
+
+def _tick(node: Node, what: str, findings: ProblemList) -> int | None:
+    if not isinstance(node, Scalar) or not node.plain or not _TICK.match(node.text):
+        wrong_kind(node, what, "a number of milliseconds such as 5.5", findings)
+        return None
+    try:
+        return tick_ns(node.text)
+    except ValueError as error:
+        findings.add("AMX6210", f"{what.removeprefix('tick_ms of ')}: {error}", node.span)
+        return None
+
+
+_TICK_MS = Key("tick_ms", steps("Tick rate in ms; the scan time of a task is its TICKS times this.", *_TICKS_MS), _tick)
 
 
 @dataclass(frozen=True)
@@ -70,20 +84,20 @@ class ProcessorKind:
 
     word = "processor"
     models = {"57C430A": "6010", "57C431": "6011", "57C435": "7010"}  # noqa: RUF012
-    options: Keys = MappingProxyType(
-        {
-            "tick_ms": steps("Tick rate in ms; the scan time of a task is its TICKS times this.", *_TICKS_MS),
-            "tasks": tasks_schema(PRIORITIES),
-        }
-    )
+    options: Keys = MappingProxyType({**schemas(_TICK_MS), "tasks": tasks_schema(PRIORITIES)})
 
     def read(self, found: ModuleSection) -> ProcessorConfig:
-        """Read tick and tasks."""
-        _check_model(found)
-        tick = _tick(found.section.get("tick_ms"), found)
-        tasks = found.section.get("tasks")
-        read = found.tasks.read(tasks, found.where) if tasks else ()
-        return ProcessorConfig(found.slot, found.model, tick, read, found.span.line)
+        """Read tick and tasks; the Executive may be too old for the module or for the tick."""
+        since = _SINCE.get(found.model, OLDEST)
+        if found.executive < since:
+            version = version_text(found.executive)
+            message = f"{found.where} needs executive {version_text(since)} or later, not {version}"
+            found.findings.add("AMX6703", message, found.span)
+        node, tick = found.section.get("tick_ms"), found.section.read(_TICK_MS)
+        fault = tick_fault(found.executive, tick) if tick is not None else None
+        if fault is not None and node is not None:
+            found.findings.add("AMX6702", f"{found.where}: {fault}", node.span)
+        return ProcessorConfig(found.slot, found.model, tick or DEFAULT_TICK_NS, found.read_tasks(), found.span.line)
 
     def check_places(self, rack: RackLayout) -> None:
         """Report too few or too many Processors, and those in slots other than 1 to 4, or 0 for a lone Processor."""
@@ -111,30 +125,6 @@ class ProcessorKind:
 
 
 PROCESSOR = ProcessorKind()
-
-
-def _tick(node: Node | None, found: ModuleSection) -> int:
-    if node is None:
-        return DEFAULT_TICK_NS
-    if not isinstance(node, Scalar) or not node.plain or not _TICK.match(node.text):
-        wrong_kind(node, f"tick_ms of {found.where}", "a number of milliseconds such as 5.5", found.findings)
-        return DEFAULT_TICK_NS
-    try:
-        tick = tick_ns(node.text)
-    except ValueError as error:
-        found.findings.add("AMX6210", f"{found.where}: {error}", node.span)
-        return DEFAULT_TICK_NS
-    fault = tick_fault(found.executive, tick)
-    if fault is not None:
-        found.findings.add("AMX6702", f"{found.where}: {fault}", node.span)
-    return tick
-
-
-def _check_model(found: ModuleSection) -> None:
-    since = _SINCE.get(found.model, OLDEST)
-    if found.executive < since:
-        message = f"{found.where} needs executive {version_text(since)} or later, not {version_text(found.executive)}"
-        found.findings.add("AMX6703", message, found.span)
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from types import MappingProxyType
 
 from automax_ros.compile.base.cost import Model
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.core.json_schema import Keys, may_be_empty, section, words
-from automax_ros.core.text import quoted
+from automax_ros.core.json_schema import Keys, may_be_empty, section
 from automax_ros.core.ticks import UDC_TICK_NS
 from automax_ros.core.types import DataType
 from automax_ros.core.yaml_text import Node
@@ -29,8 +28,8 @@ from automax_ros.language.tree.walk import arguments_of, expressions_of, parts, 
 from automax_ros.rackfile.model.module import Interrupt, Registers, TaskConfig
 from automax_ros.rackfile.model.plants import PlantConfig, plant_name
 from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
-from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, text_value
-from automax_ros.rackfile.sections.tasks import TaskPlace, tasks_schema
+from automax_ros.rackfile.reading.values import Key, ProblemList, Section, choice_key, entries_of
+from automax_ros.rackfile.sections.tasks import TaskPlace, TaskPlaces, tasks_schema
 
 COUNT = 2048
 RAIL = range(24)
@@ -85,35 +84,33 @@ MAX_UDCS = 10
 """Most UDC modules of one rack (J2-3106-1 p. 2-5)."""
 DRIVES = ("A", "B")
 """The drives of a UDC, in the order in which their tasks run."""
-_PLANTS = may_be_empty(
-    section("The plants that its drives turn.", {drive: plant_name(f"The plant of drive {drive}.") for drive in DRIVES})
+_DRIVE = choice_key(
+    "drive",
+    "The drive that the task is for; A runs before B.",
+    dict(zip(DRIVES, DRIVES, strict=True)),
+    ("AMX6470", "{what} is {given}; it must be A or B"),
 )
+_PLANTS = {drive: plant_name(f"The plant of drive {drive}.") for drive in DRIVES}
+_PLANTS_SCHEMA = may_be_empty(section("The plants that its drives turn.", _PLANTS))
 
 
 def estimated_bytes(program: Program) -> int:
     """Return the approximate size of a task, in bytes: its code, its locals, and the state of its blocks."""
     statements = list(statements_in_order((*program.startup, *program.scan)))
-    terms = 0
+    terms = states = 0
     for statement, _ in statements:
         given = (*expressions_of(statement), *(argument.value for argument in arguments_of(statement)))
         terms += sum(1 for expression in given for _ in parts(expression))
+    for bound in program.calls.values():
+        states += sum(1 if state.size is None else state.size(bound.facts) for state in bound.block.states)
     code = STATEMENT_BYTES * len(statements) + TERM_BYTES * terms
     variables = sum(_variable_bytes(symbol) for symbol in program.symbols.values() if symbol.scope is Scope.LOCAL)
-    return code + variables + _STATE_BYTES * _states(program)
+    return code + variables + _STATE_BYTES * states
 
 
 def _variable_bytes(symbol: Symbol) -> int:
     size = symbol.length + 1 if symbol.type is DataType.STRING else _VALUE_BYTES[symbol.type]
     return size * symbol.elements
-
-
-def _states(program: Program) -> int:
-    """Return the number of values in the state of the blocks."""
-    return sum(
-        1 if state.size is None else state.size(bound.facts)
-        for bound in program.calls.values()
-        for state in bound.block.states
-    )
 
 
 @dataclass(frozen=True)
@@ -145,29 +142,22 @@ class UdcConfig:
         return replace(UDC_REGISTERS, shown=shown) if shown else UDC_REGISTERS
 
 
-class _Drives:
-    """The tasks of one UDC: each drive has at most one."""
+def _drives() -> TaskPlaces:
+    """Return the places of the tasks of one UDC: each drive has at most one."""
+    taken: dict[str, Span] = {}
 
-    key, sample, most = "drive", "A", len(DRIVES)
-    schema = words("The drive that the task is for; A runs before B.", DRIVES)
-
-    def __init__(self) -> None:
-        self._taken: dict[str, Span] = {}
-
-    def read(self, node: Node, what: str, findings: ProblemList) -> TaskPlace | None:
-        """Return a drive."""
-        text = text_value(node, f"drive of {what}", findings, limit=100)
+    def read(node: Node, what: str, findings: ProblemList) -> TaskPlace | None:
+        text = _DRIVE.read(node, what, findings)
+        if text is not None and text in taken:
+            note = Note("that task is here", taken[text])
+            findings.add("AMX6470", f"drive {text} has a task already", node.span, notes=(note,))
+            return None
         if text is None:
             return None
-        if text not in DRIVES:
-            findings.add("AMX6470", f"drive of {what} is {quoted(text)}; it must be A or B", node.span)
-        elif text in self._taken:
-            note = Note("that task is here", self._taken[text])
-            findings.add("AMX6470", f"drive {text} has a task already", node.span, notes=(note,))
-        else:
-            self._taken[text] = node.span
-            return TaskPlace(DRIVES.index(text), text)
-        return None
+        taken[text] = node.span
+        return TaskPlace(DRIVES.index(text), text)
+
+    return TaskPlaces(Key("drive", _DRIVE.schema, read), "A", len(DRIVES))
 
 
 class UdcKind:
@@ -175,14 +165,17 @@ class UdcKind:
 
     word = "UDC"
     models = {"57552": "UDC module"}  # noqa: RUF012
-    options: Keys = MappingProxyType({"tasks": tasks_schema(_Drives()), "plants": _PLANTS})
+    options: Keys = MappingProxyType({"tasks": tasks_schema(_drives()), "plants": _PLANTS_SCHEMA})
 
     def read(self, found: ModuleSection) -> UdcConfig:
-        """Read tasks and plants."""
-        node = found.section.get("tasks")
-        tasks = found.tasks.read(node, found.where, _Drives()) if node else ()
+        """Read tasks and plants; a task in a language that a UDC does not have is reported (J2-3106-1 p. 2-5)."""
+        tasks = found.read_tasks(_drives())
         for task in tasks:
-            _check_source_kind(task, found)
+            suffix = task.file.suffix.upper()
+            if suffix != ".BLK":
+                message = f"task {task.name} of {found.where} is a {suffix} file"
+                message += "; a UDC runs control-block tasks (.BLK) only"
+                found.findings.add("AMX6304", message, Span(task.line, 1, 2))
         in_order = tuple(sorted(tasks, key=lambda task: task.priority))
         return UdcConfig(found.slot, found.model, in_order, _plants(found), found.span.line)
 
@@ -197,20 +190,9 @@ class UdcKind:
 UDC = UdcKind()
 
 
-def _check_source_kind(task: TaskConfig, found: ModuleSection) -> None:
-    """Report a task in a language that a UDC does not have (J2-3106-1 p. 2-5)."""
-    suffix = task.file.suffix.upper()
-    if suffix != ".BLK":
-        message = f"task {task.name} of {found.where} is a {suffix} file; a UDC runs control-block tasks (.BLK) only"
-        found.findings.add("AMX6304", message, Span(task.line, 1, 2))
-
-
 def _plants(found: ModuleSection) -> Mapping[str, PlantConfig]:
-    node = found.section.get("plants")
-    if node is None:
-        return {}
-    what = f"plants of {found.where}"
-    section = Section(entries_of(node, what, found.findings) or (), what, DRIVES, found.findings)
+    node, what = found.section.get("plants"), f"plants of {found.where}"
+    section = Section(entries_of(node, what, found.findings) or () if node else (), what, DRIVES, found.findings)
     named = ((drive, section.get(drive)) for drive in DRIVES)
     claimed = ((drive, found.plants.claim(node, f"drive {drive} of {found.where}")) for drive, node in named if node)
     return {drive: plant for drive, plant in claimed if plant is not None}

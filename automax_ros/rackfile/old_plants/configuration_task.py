@@ -88,8 +88,6 @@ def read_configuration(source: SourceText) -> Configuration:
 
 
 class _Fault(Exception):
-    """Ends one statement; carries its diagnostic."""
-
     def __init__(self, code: str, message: str, span: Span, hint: str | None = None, first: Span | None = None) -> None:
         super().__init__(message)
         notes = () if first is None else (Note("first defined here", first),)
@@ -98,15 +96,11 @@ class _Fault(Exception):
 
 @dataclass(frozen=True)
 class _Given:
-    """A key of a definition with its value, None for a key without one."""
-
     key: Token
     value: Token | None
 
 
 class _Tokens:
-    """The tokens of one statement, read one after the other."""
-
     def __init__(self, tokens: list[Token]) -> None:
         self._tokens = tokens
         self._place = 0
@@ -170,7 +164,6 @@ class _Reader:
             self._report(fault.diagnostic)
 
     def _report(self, diagnostic: Diagnostic) -> None:
-        """Keep a diagnostic, up to a limit; statements after it are read all the same."""
         if len(self.found.diagnostics) < _MOST_DIAGNOSTICS:
             self.found.diagnostics.append(diagnostic)
         elif len(self.found.diagnostics) == _MOST_DIAGNOSTICS:
@@ -205,7 +198,6 @@ class _Reader:
         )
 
     def _network(self, word: Token, tokens: _Tokens) -> None:
-        """Read a definition on a 57C404; without its slot and drop it is treated as one that is elsewhere."""
         declared, span = self._variable(tokens)
         keys = {} if tokens.at_end else self._keys(tokens, None)
         if not {"SLOT", "DROP"} <= keys.keys():
@@ -278,7 +270,6 @@ class _Reader:
             raise _Fault(fault.code, f"{quoted(text)}: {fault.message}", first.span, fault.hint) from fault
 
     def _keys(self, tokens: _Tokens, known: tuple[str, ...] | None) -> dict[str, _Given]:
-        """Read ``[KEY=VALUE, ...]``; any keys if ``known`` is None."""
         tokens.require("[", "the name")
         keys: dict[str, _Given] = {}
         while True:

@@ -206,7 +206,6 @@ class Draft:
         return {name: result.program for name, result in self.results.items()}
 
     def _udcs(self, processors: int) -> list[DraftedUdc]:
-        """Return the UDC modules, in slots that are otherwise free."""
         drives = {slot for program in self._programs.values() for slot, _ in _drive_modules(program)}
         free = (slot for slot in range(processors + 1, MAX_SLOT + 1) if slot not in drives)
         names = [task.name for task in self.tasks if task.on_udc]
@@ -253,7 +252,6 @@ class Draft:
             yield commented(f"  {text}: {{{', '.join(options)}}}", ", ".join(users[:_MOST_NAMED]) + more)
 
     def _memory_module(self) -> str:
-        """Return the smallest common memory that holds the commons, else the largest."""
         needed = sum(
             CommonVariable(spec.name, spec.type, spec.dimensions, spec.length).registers
             for spec in self.commons.values()
@@ -263,7 +261,6 @@ class Draft:
 
 
 def _drive_modules(program: Program | None) -> list[tuple[int, str]]:
-    """Return slots and models of the modules that the CALL of a drive's task names; none for any other task."""
     if program is None or program.cml is None:
         return []
     facts = program.cml.facts
@@ -271,7 +268,6 @@ def _drive_modules(program: Program | None) -> list[tuple[int, str]]:
 
 
 def _file_key(task: DraftedTask) -> str:
-    """Return the key of a task's file, if its name is not the usual one."""
     return "" if task.file == f"{task.name}.BLK" else f"file: {_yaml_quoted(task.file)}, "
 
 
@@ -315,7 +311,6 @@ def _sources(folder: Path) -> list[Path]:
 
 
 def _take(found: Draft, path: Path, folder: Path, inner: Path) -> None:
-    """Add a file to the draft, or note why not."""
     if not path.name.isprintable():
         found.left_out.append((path.name, "has a name that no rack file can hold: rename it"))
         return
@@ -355,7 +350,6 @@ def _add_common(found: Draft, task: DraftedTask, declared: Declared) -> None:
 
 
 def _task_name(stem: str, taken: set[str]) -> str:
-    """Return a task's name made from its file's name (2.4.1)."""
     plain = re.sub(r"[^A-Z0-9_]", "_", stem.upper())
     plain = plain if plain[:1].isalpha() else f"T{plain}"
     name, number = plain[:TASK_NAME_LIMIT], 1

@@ -94,7 +94,6 @@ class _Importing:
         self.diagnostics.append(Diagnostic("AMX6787", f"task {task.name} is left out: {reason}", Span(task.line, 1, 2)))
 
     def _reason(self, task: DefinedTask, file: str, number: int) -> str | None:
-        """Return why a task cannot be in the rack file, None if it can."""
         if f".{task.type}" not in self.suffixes:
             return f"{file}: tasks of this kind are not run"
         if task.slot == 0 and any(other.slot for other in self.configuration.tasks):
@@ -121,7 +120,6 @@ class _Importing:
 
     @property
     def _networks(self) -> set[int]:
-        """The slots of 57C404 modules: those of NETDEF, and those that the caller names."""
         named = {slot for slot, model in self.modules.items() if model == _NETWORK}
         return named | {item.point.slot for item in self.configuration.commons if item.point and item.drop is not None}
 
@@ -140,7 +138,6 @@ class _Importing:
 
 
 def _with_registers(highest: int) -> list[str]:
-    """Return the modules with I/O points that have a register of this number."""
     return [
         number
         for kind in KINDS

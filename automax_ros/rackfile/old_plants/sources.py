@@ -54,8 +54,6 @@ class Converted:
 
 @dataclass
 class _Counts:
-    """Counts of each kind of change, by its name."""
-
     numbers: dict[str, int] = field(default_factory=dict)
 
     def add(self, thing: str) -> None:
@@ -102,7 +100,6 @@ def _decoded(data: bytes) -> tuple[str, str, list[str]]:
 
 
 def _stable(text: str, check: Check, counts: _Counts) -> str:
-    """Return a text that one more pass would not change."""
     for _ in range(_MOST_ROUNDS):
         changed = _with_constants(_in_upper_case(_without_control(text, counts), counts), check, counts)
         if changed == text:
@@ -112,7 +109,6 @@ def _stable(text: str, check: Check, counts: _Counts) -> str:
 
 
 def _without_control(text: str, counts: _Counts) -> str:
-    """Return the text with blanks for control characters, and for tabs outside of quotes."""
     lines = text.split("\n")
     quoted, _ = _ranges(text)
     for row, line in enumerate(lines):
@@ -138,7 +134,6 @@ def _plain(line: str, quoted: list[range], counts: _Counts) -> str:
 
 
 def _in_upper_case(text: str, counts: _Counts) -> str:
-    """Return the text in upper case, except texts between quotes and remarks."""
     lines = text.split("\n")
     quoted, remarks = _ranges(text)
     for row, line in enumerate(lines):
@@ -190,7 +185,6 @@ class _Silent(Reporter):
 
 
 def _with_constants(text: str, check: Check, counts: _Counts) -> str:
-    """Return the text with the decimal points and string lengths that the check misses."""
     lines = text.split("\n")
     found = [item for item in check(text) if item.code in _CURES]
     for item in sorted(found, key=lambda item: item.span, reverse=True):

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 
+from automax_ros.core.json_schema import number
 from automax_ros.core.ticks import DEFAULT_TICK_NS
 from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.rackfile.reading.values import ProblemList, wrong_kind
+from automax_ros.rackfile.reading.values import Key, ProblemList, wrong_kind
 
 OLDEST, NEWEST = 20, 42
 """The versions that the manuals at hand describe: 2.0 (1.1) to 4.2 (J2-3045)."""
@@ -21,18 +22,25 @@ _TICK_CHOSEN = 31
 _MORE_FORCES = 40
 
 
-def executive_value(node: Node, findings: ProblemList) -> int:
-    """Return a version such as 3.8 in tenths; one with errors is reported, and the newest returned."""
+def _version(node: Node, what: str, findings: ProblemList) -> int | None:
     match = _VERSION.match(node.text) if isinstance(node, Scalar) and node.plain else None
     if match is None:
-        wrong_kind(node, "executive", f"a version such as {version_text(NEWEST)}", findings)
-        return NEWEST
+        wrong_kind(node, what, f"a version such as {version_text(NEWEST)}", findings)
+        return None
     version = int(match[1]) * 10 + int(match[2] or 0)
     if not OLDEST <= version <= NEWEST:
-        message = f"executive is {version_text(version)}; it must be {version_text(OLDEST)} to {version_text(NEWEST)}"
+        message = f"{what} is {version_text(version)}; it must be {version_text(OLDEST)} to {version_text(NEWEST)}"
         findings.add("AMX6701", message, node.span)
-        return NEWEST
+        return None
     return version
+
+
+EXECUTIVE = Key(
+    "executive",
+    number("Version of the AutoMax Programming Executive.", OLDEST / 10, NEWEST / 10, NEWEST / 10),
+    _version,
+)
+"""A version such as 3.8."""
 
 
 def version_text(version: int) -> str:

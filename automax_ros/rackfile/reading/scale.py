@@ -7,7 +7,9 @@ reports and recordings of common memory, it is counts (decision).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 from automax_ros.core.diagnostics import Span
@@ -15,7 +17,6 @@ from automax_ros.core.json_schema import Keys, Schema, listed, section
 from automax_ros.core.numbers import REAL_LIMIT, round_count
 from automax_ros.core.types import DataType
 from automax_ros.core.yaml_text import Node, Sequence
-from automax_ros.rackfile.reading.names import VariableName
 from automax_ros.rackfile.reading.values import (
     ProblemList,
     Section,
@@ -57,65 +58,39 @@ class Scale:
         return first + round_count(share * (last - first)), False
 
 
-def scale_of(node: Node, declared: VariableName, span: Span, findings: ProblemList) -> Scale | None:
-    """Read ``{counts: [a, b], value: [x, y]}``; None if a problem was reported."""
-    what = f"scale of {declared.name}"
+def scale_of(
+    node: Node, name: str, kind: DataType, span: Span, findings: ProblemList, *, is_array: bool = False
+) -> Scale | None:
+    """Read the scale of a variable, ``{counts: [a, b], value: [x, y]}``; None if a problem was reported."""
+    what = f"scale of {name}"
     entries = entries_of(node, what, findings)
     if entries is None:
         return None
-    if declared.dimensions or not declared.type.is_integer:
-        kind = "an array" if declared.dimensions else declared.type.word
-        hint = "only a simple INTEGER or DOUBLE INTEGER has counts"
-        findings.add(_CODE, f"{declared.name} cannot have a scale: it is {kind}", span, hint)
+    if is_array or not kind.is_integer:
+        message = f"{name} cannot have a scale: it is {'an array' if is_array else kind.word}"
+        findings.add(_CODE, message, span, "only a simple INTEGER or DOUBLE INTEGER has counts")
         return None
     section = Section(entries, what, _KEYS, findings)
     if not section.require(_KEYS, what, span, findings):
         return None
-    counts = _counts(section, what, declared.type, findings)
-    value = _values(section, what, findings)
+    low, high = (int(limit) for limit in kind.range)
+    counts = _pair(section, "counts", partial(integer_value, low=low, high=high, code=_CODE))
+    value = _pair(section, "value", partial(number_value, low=-REAL_LIMIT, high=REAL_LIMIT, code=_CODE))
     return Scale(counts, value) if counts is not None and value is not None else None
 
 
-def _counts(section: Section, what: str, kind: DataType, findings: ProblemList) -> tuple[int, int] | None:
-    low, high = (int(limit) for limit in kind.range)
-    items = _pair(section, "counts", what, findings)
-    numbers = [integer_value(item, f"counts of the {what}", findings, low=low, high=high, code=_CODE) for item in items]
-    return _different(section, "counts", what, numbers, findings)
-
-
-def _values(section: Section, what: str, findings: ProblemList) -> tuple[float, float] | None:
-    items = _pair(section, "value", what, findings)
-    limit = {"low": -REAL_LIMIT, "high": REAL_LIMIT}
-    numbers = [number_value(item, f"value of the {what}", findings, **limit, code=_CODE) for item in items]
-    found = _different(section, "value", what, numbers, findings)
-    if found is not None and not math.isfinite(1.0 / (found[1] - found[0])):
-        _report_equal(section, "value", what, findings)
-        return None
-    return found
-
-
-def _pair(section: Section, key: str, what: str, findings: ProblemList) -> tuple[Node, ...]:
-    """Return the two items of a list, () (reported) if it is anything else."""
-    node = section.get(key)
+def _pair(section: Section, key: str, read: Callable[[Node, str, ProblemList], _N | None]) -> tuple[_N, _N] | None:
+    """Return two numbers that differ enough for a line through them, None if a problem was reported."""
+    node, what = section.get(key), f"{key} of the {section.owner}"
     assert node is not None
     if not isinstance(node, Sequence) or len(node.items) != 2:
-        wrong_kind(node, f"{key} of the {what}", "a list of two numbers", findings)
-        return ()
-    return node.items
-
-
-def _different(
-    section: Section, key: str, what: str, numbers: list[_N | None], findings: ProblemList
-) -> tuple[_N, _N] | None:
-    given = [number for number in numbers if number is not None]
-    if len(given) != 2:
+        wrong_kind(node, what, "a list of two numbers", section.findings)
         return None
-    if given[0] == given[1]:
-        _report_equal(section, key, what, findings)
+    first, last = [read(item, what, section.findings) for item in node.items]
+    if first is None or last is None:
         return None
-    return given[0], given[1]
-
-
-def _report_equal(section: Section, key: str, what: str, findings: ProblemList) -> None:
-    message = f"the two numbers of {key} of the {what} are equal"
-    findings.add(_CODE, message, section.key_span(key), "write those of two different points")
+    if first == last or not math.isfinite(1.0 / (last - first)):
+        message = f"the two numbers of {what} are equal"
+        section.findings.add(_CODE, message, section.key_span(key), "write those of two different points")
+        return None
+    return first, last

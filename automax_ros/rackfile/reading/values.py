@@ -1,6 +1,6 @@
 """Values in a rack file, each checked in its place: text, numbers, TRUE and FALSE, sections with known keys.
 
-``ProblemList`` collects the diagnostics.
+A ``Key`` is declared once: its JSON schema and the reading of its value, with limits, problem code and texts.
 """
 
 from __future__ import annotations
@@ -8,8 +8,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterable
 from collections.abc import Mapping as AbstractMapping
-from typing import TypeGuard, TypeVar
+from dataclasses import dataclass
+from typing import Any, Generic, TypeGuard, TypeVar
 
+from automax_ros.core import json_schema
 from automax_ros.core.diagnostics import Diagnostic, Note, Span, in_order
 from automax_ros.core.problems import PROBLEMS, Severity
 from automax_ros.core.text import did_you_mean, quoted
@@ -20,11 +22,11 @@ from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence
 MAX_FINDINGS = 200
 """Most errors, and most warnings, that one file reports (decision: nobody reads more; hostile files have millions)."""
 _YAML_CODES = {Flaw.SYNTAX: "AMX6003", Flaw.EXTRA: "AMX6004", Flaw.SIZE: "AMX6005"}
-
-
 _OCTAL = re.compile(r"[-+]?0+[0-9]")
 """Leading zeros make YAML read another number."""
-_T = TypeVar("_T", int, float)
+_N = TypeVar("_N", int, float)
+_T = TypeVar("_T")
+_T_co = TypeVar("_T_co", covariant=True)
 Entry = tuple[Scalar, Node]
 
 
@@ -121,12 +123,12 @@ def boolean_value(node: Node, what: str, findings: ProblemList) -> bool | None:
 
 def integer_value(node: Node, what: str, findings: ProblemList, *, low: int, high: int, code: str) -> int | None:
     """Return a whole number from ``low`` to ``high``; ``code`` is the problem of one outside this range."""
-    return _number(node, what, "a whole number", whole_number, findings, (low, high, code))
+    return _number(node, what, findings, "a whole number", whole_number, low, high, code)
 
 
 def number_value(node: Node, what: str, findings: ProblemList, *, low: float, high: float, code: str) -> float | None:
     """Return a number from ``low`` to ``high``; ``code`` is the problem of one outside this range."""
-    return _number(node, what, "a number", number, findings, (low, high, code))
+    return _number(node, what, findings, "a number", number, low, high, code)
 
 
 def is_plain_word(node: Node) -> TypeGuard[Scalar]:
@@ -137,12 +139,13 @@ def is_plain_word(node: Node) -> TypeGuard[Scalar]:
 def _number(
     node: Node,
     what: str,
-    word: str,
-    read: Callable[[str], _T],
     findings: ProblemList,
-    limits: tuple[float, float, str],
-) -> _T | None:
-    low, high, code = limits
+    word: str,
+    read: Callable[[str], _N],
+    low: float,
+    high: float,
+    code: str,
+) -> _N | None:
     try:
         if not is_plain_word(node):
             raise ValueError
@@ -179,10 +182,77 @@ def entries_of(node: Node, what: str, findings: ProblemList) -> tuple[Entry, ...
     return None
 
 
+@dataclass(frozen=True)
+class Key(Generic[_T_co]):
+    """A key of a section: its schema, and ``read``, which returns its value, or None after it reported a problem.
+
+    ``read`` is called with the node, its name in messages and the list of problems.
+    """
+
+    name: str
+    schema: json_schema.Schema
+    read: Callable[[Node, str, ProblemList], _T_co | None]
+
+
+def number_key(name: str, text: str, low: float, high: float, code: str, default: float | None = None) -> Key[float]:
+    """Return the key of a number; ``default`` is shown by the schema only."""
+    limits: dict[str, Any] = {"low": low, "high": high, "code": code}
+    schema = json_schema.number(text, low, high, default)
+    return Key(name, schema, lambda node, what, findings: number_value(node, what, findings, **limits))
+
+
+def whole_key(name: str, text: str, low: int, high: int, code: str, default: int | None = None) -> Key[int]:
+    """Return the key of a whole number; ``default`` is shown by the schema only."""
+    limits: dict[str, Any] = {"low": low, "high": high, "code": code}
+    schema = json_schema.whole(text, low, high, default)
+    return Key(name, schema, lambda node, what, findings: integer_value(node, what, findings, **limits))
+
+
+def flag_key(name: str, text: str) -> Key[bool]:
+    """Return the key of true or false, false by default."""
+    return Key(name, json_schema.flag(text, False), boolean_value)
+
+
+def text_key(name: str, schema: json_schema.Schema, limit: int = 100) -> Key[str]:
+    """Return the key of a text of one line, at most ``limit`` characters, unless the schema has a smaller limit."""
+    most = min(limit, schema.get("maxLength", limit))
+    return Key(name, schema, lambda node, what, findings: text_value(node, what, findings, limit=most))
+
+
+def choice_key(
+    name: str,
+    text: str,
+    known: AbstractMapping[str, _T],
+    wrong: tuple[str, str],
+    hint: Callable[[str], str | None] | None = None,
+    default: str | None = None,
+) -> Key[_T]:
+    """Return the key of one of some words, each with its value.
+
+    ``wrong`` are code and message for any other word, in which ``{what}`` and ``{given}`` are replaced; ``hint`` makes
+    the remedy from the word.
+    """
+
+    def read(node: Node, what: str, findings: ProblemList) -> _T | None:
+        word = text_value(node, what, findings, limit=100)
+        if word is not None and word not in known:
+            message = wrong[1].format(what=what, given=quoted(word))
+            findings.add(wrong[0], message, node.span, hint(word) if hint is not None else None)
+        return None if word is None else known.get(word)
+
+    return Key(name, json_schema.words(text, known, default), read)
+
+
+def schemas(*keys: Key[Any]) -> dict[str, json_schema.Schema]:
+    """Return the schemas of keys by their names."""
+    return {key.name: key.schema for key in keys}
+
+
 class Section:
     """A mapping whose keys have fixed names.
 
-    Reports AMX6006 for a repeated key and AMX6007 for an unknown key.
+    Reports AMX6006 for a repeated key and AMX6007 for an unknown key. ``owner`` names the section in messages about its
+    values, ``findings`` is the list of problems.
     """
 
     def __init__(
@@ -192,11 +262,14 @@ class Section:
         known: Collection[str],
         findings: ProblemList,
         hints: AbstractMapping[str, str] | None = None,
+        owner: str | None = None,
     ) -> None:
         """Sort the entries; ``what`` names the section in messages, ``known`` are its keys.
 
-        ``hints`` have, for unknown keys that users may try, the right ones.
+        ``hints`` have, for unknown keys that users may try, the right ones. ``owner`` is ``what`` if not given, "" if
+        messages about values name the key alone.
         """
+        self.owner, self.findings = what if owner is None else owner, findings
         self._values: dict[str, Entry] = {}
         for key, value in entries:
             if key.text not in known:
@@ -215,6 +288,17 @@ class Section:
         """Return the value of a key, None if the file does not have it."""
         entry = self._values.get(key)
         return entry[1] if entry else None
+
+    def read(self, key: Key[_T], owner: str | None = None) -> _T | None:
+        """Return the value of a key, None if the file does not have it or a problem was reported."""
+        node, owner = self.get(key.name), self.owner if owner is None else owner
+        what = f"{key.name} of {owner}" if owner else key.name
+        return None if node is None else key.read(node, what, self.findings)
+
+    def read_all(self, keys: Iterable[Key[_T]]) -> dict[str, _T]:
+        """Return the values of those keys that the file has, without those that have problems."""
+        found = {key.name: self.read(key) for key in keys}
+        return {name: value for name, value in found.items() if value is not None}
 
     def key_span(self, key: str) -> Span:
         """Return the place of a key that the section has."""

@@ -7,6 +7,7 @@ Presets are in the variable's own type. The hardware has none; in the emulator a
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.json_schema import (
@@ -14,11 +15,9 @@ from automax_ros.core.json_schema import (
     Schema,
     either,
     entries,
-    flag,
     line,
     listed,
     may_be_empty,
-    number,
     scalar,
     section,
     words,
@@ -35,41 +34,60 @@ from automax_ros.rackfile.reading.names import COMMON_NAME, DeclarationFault, Va
 from automax_ros.rackfile.reading.scale import SCHEMA as SCALE
 from automax_ros.rackfile.reading.scale import Scale, scale_of
 from automax_ros.rackfile.reading.values import (
+    Key,
     ProblemList,
     Section,
-    boolean_value,
     entries_of,
+    flag_key,
     is_plain_word,
     kind_of,
     number_hint,
-    number_value,
+    number_key,
     report_twice,
+    schemas,
+    text_key,
     text_value,
     wrong_kind,
 )
 from automax_ros.rackfile.sections.points import KEYS, PointReader
 
 _CODE = "AMX6406"
-
-
-UNIT_LIMIT = 16
-DESCRIPTION_LIMIT = 200
-"""Longest `unit` and longest `description`, in characters (decision)."""
-MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
-"""Range of `rate_limit_hz` (decision: 2000 Hz is one message per tick of 0.5 ms)."""
 _DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
+
+
+def _direction(node: Node, what: str, findings: ProblemList) -> Direction | None:
+    if not isinstance(node, Scalar) or node.is_null:
+        wrong_kind(node, what, "out, in or closed", findings)
+        return None
+    if node.text not in _DIRECTIONS:
+        message = f"{what} is {quoted(node.text)}; it must be out, in or closed"
+        findings.add("AMX6407", message, node.span, did_you_mean(node.text, _DIRECTIONS))
+    return _DIRECTIONS.get(node.text)
+
+
+_ROS = Key(
+    "ros",
+    words("`out`: a topic with the value; `in`: that, and one that writes it; `closed`: neither.", _DIRECTIONS),
+    _direction,
+)
+RATE = number_key("rate_limit_hz", "Most messages per second on the topic.", 0.01, 2000.0, "AMX6408")
+"""Its range is ours (decision: 2000 Hz is one message per tick of 0.5 ms)."""
+_NON_VOLATILE = flag_key("non_volatile", "Whether the value survives STOP ALL, a power cycle and a restart.")
+UNIT, DESCRIPTION = (
+    text_key("unit", line("The engineer's unit.", 16)),
+    text_key("description", line("A line about the variable.", 200), 200),
+)
+"""Their lengths are ours (decision)."""
 OPTIONS: Keys = {
-    "ros": words("`out`: a topic with the value; `in`: that, and one that writes it; `closed`: neither.", _DIRECTIONS),
-    "rate_limit_hz": number("Most messages per second on the topic.", MIN_RATE_HZ, MAX_RATE_HZ),
+    **schemas(_ROS, RATE),
     "preset": either(
         "Written when the rack starts; for an array also a list, the last subscript running fastest.",
         scalar("The value, for an array that of each element."),
         listed("A value for each element.", scalar("The value of an element.")),
     ),
-    "non_volatile": flag("Whether the value survives STOP ALL, a power cycle and a restart.", False),
-    "unit": line("The engineer's unit.", UNIT_LIMIT),
+    **schemas(_NON_VOLATILE, UNIT),
     "scale": SCALE,
-    "description": line("A line about the variable.", DESCRIPTION_LIMIT),
+    **schemas(DESCRIPTION),
     **KEYS,
 }
 """The keys of a common variable."""
@@ -83,40 +101,34 @@ SCHEMA: Schema = may_be_empty(
 _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 
 
-def preset_value(
-    node: Node, variable: VariableName, elements: int, findings: ProblemList
-) -> Value | tuple[Value, ...] | None:
-    """Return the preset of a variable with ``elements`` values; None if a problem was reported."""
+def _preset(node: Node | None, variable: CommonVariable, findings: ProblemList) -> Value | tuple[Value, ...] | None:
     what = f"preset of {variable.name}"
     if not isinstance(node, Sequence):
-        return _one(node, variable, what, findings)
-    if not variable.dimensions:
+        return None if node is None else _one(node, variable, what, findings)
+    if not variable.is_array:
         findings.add(_CODE, f"{what} is a list, but the variable is not an array", node.span)
         return None
-    if len(node.items) != elements:
-        message = f"{what} has {len(node.items)} values; the array has {elements} elements"
+    if len(node.items) != variable.elements:
+        message = f"{what} has {len(node.items)} values; the array has {variable.elements} elements"
         findings.add(_CODE, message, node.span, "subscripts count from 0: an array (10) has 11 elements")
         return None
     values = [_one(item, variable, what, findings) for item in node.items]
     return tuple(value for value in values if value is not None) if None not in values else None
 
 
-def _one(node: Node, variable: VariableName, what: str, findings: ProblemList) -> Value | None:
+def _one(node: Node, variable: CommonVariable, what: str, findings: ProblemList) -> Value | None:
     kind = variable.type
     if kind is DataType.STRING:
-        return _text(node, variable.length, what, findings)
+        text = text_value(node, what, findings, limit=1000)
+        if text is not None and len(text) > variable.length:
+            message = f"{what} has {len(text)} characters; the string holds {variable.length}"
+            findings.add(_CODE, message, node.span)
+            return None
+        return text
     value = value_of(node.text, kind) if is_plain_word(node) else None
     if value is None:
         findings.add(_CODE, f"{what} must be {wanted(kind)}, not {kind_of(node)}", node.span, number_hint(node))
     return value
-
-
-def _text(node: Node, length: int, what: str, findings: ProblemList) -> str | None:
-    text = text_value(node, what, findings, limit=1000)
-    if text is not None and len(text) > length:
-        findings.add(_CODE, f"{what} has {len(text)} characters; the string holds {length}", node.span)
-        return None
-    return text
 
 
 class CommonReader:
@@ -146,28 +158,24 @@ class CommonReader:
         options = entries_of(node, f"options of {quoted(key.text)}", self._findings)
         if declared is None or options is None:
             return None
-        section = Section(options, f"common variable {declared.name}", OPTIONS, self._findings)
+        name = declared.name
+        section = Section(options, f"common variable {name}", OPTIONS, self._findings, owner=name)
         self._check_predefined(key, declared, section)
-        variable = CommonVariable(declared.name, declared.type, declared.dimensions, declared.length)
-        preset = section.get("preset")
+        variable = CommonVariable(name, declared.type, declared.dimensions, declared.length, line=key.span.line)
         direction = self._direction(section, variable, key)
         point = self._points.read(section, declared, key.span)
         if direction is Direction.IN and point is not None:
             self._points.check_input(point, declared, section.key_span("ros"))
-        return CommonVariable(
-            name=declared.name,
-            type=declared.type,
-            dimensions=declared.dimensions,
-            length=declared.length,
-            non_volatile=self._flag(section, "non_volatile", declared.name),
-            preset=preset_value(preset, declared, variable.elements, self._findings) if preset else None,
+        return replace(
+            variable,
+            non_volatile=bool(section.read(_NON_VOLATILE)),
+            preset=_preset(section.get("preset"), variable, self._findings),
             direction=direction,
-            rate_limit_hz=self._rate(section, declared.name, direction),
-            unit=self._text(section, "unit", declared.name, UNIT_LIMIT),
-            description=self._text(section, "description", declared.name, DESCRIPTION_LIMIT),
-            line=key.span.line,
+            rate_limit_hz=self._rate(section, name, direction),
+            unit=section.read(UNIT) or "",
+            description=section.read(DESCRIPTION) or "",
             point=point,
-            scale=self._scale(section, declared, direction),
+            scale=self._scale(section, variable, direction),
         )
 
     def _name(self, key: Scalar) -> VariableName | None:
@@ -214,14 +222,7 @@ class CommonReader:
         node = section.get("ros")
         if node is None:
             return self._default_direction(variable, key)
-        if not isinstance(node, Scalar) or node.is_null:
-            wrong_kind(node, f"ros of {variable.name}", "out, in or closed", self._findings)
-            return Direction.CLOSED
-        direction = _DIRECTIONS.get(node.text)
-        if direction is None:
-            message = f"ros of {variable.name} is {quoted(node.text)}; it must be out, in or closed"
-            self._findings.add("AMX6407", message, node.span, did_you_mean(node.text, _DIRECTIONS))
-            return Direction.CLOSED
+        direction = section.read(_ROS) or Direction.CLOSED
         if direction is not Direction.CLOSED and variable.is_array and variable.type is DataType.STRING:
             message = f"{variable.name} cannot be published: ROS 2 has no standard message for an array of strings"
             self._findings.add("AMX6413", message, node.span, "write ros: closed")
@@ -246,32 +247,18 @@ class CommonReader:
             self._findings.add("AMX6412", message, self._left_span, "write ros: out or ros: closed for each of them")
 
     def _rate(self, section: Section, name: str, direction: Direction) -> float | None:
-        node = section.get("rate_limit_hz")
-        if node is None:
-            return None
-        rate = number_value(
-            node, f"rate_limit_hz of {name}", self._findings, low=MIN_RATE_HZ, high=MAX_RATE_HZ, code="AMX6408"
-        )
-        if direction is Direction.CLOSED:
+        rate = section.read(RATE)
+        if "rate_limit_hz" in section and direction is Direction.CLOSED:
             message = f"rate_limit_hz of {name} has no effect: the variable has no topic"
             self._findings.add("AMX6414", message, section.key_span("rate_limit_hz"), "write ros: out as well")
         return rate
 
-    def _scale(self, section: Section, declared: VariableName, direction: Direction) -> Scale | None:
-        node = section.get("scale")
+    def _scale(self, section: Section, variable: CommonVariable, direction: Direction) -> Scale | None:
+        node, name = section.get("scale"), variable.name
         if node is None:
             return None
+        span = section.key_span("scale")
         if direction is Direction.CLOSED:
-            message = f"scale of {declared.name} has no effect: the variable has no topic"
-            self._findings.add("AMX6451", message, section.key_span("scale"), "write ros: out or ros: in too")
-        return scale_of(node, declared, section.key_span("scale"), self._findings)
-
-    def _flag(self, section: Section, key: str, name: str) -> bool:
-        node = section.get(key)
-        return bool(node is not None and boolean_value(node, f"{key} of {name}", self._findings))
-
-    def _text(self, section: Section, key: str, name: str, limit: int) -> str:
-        node = section.get(key)
-        if node is None:
-            return ""
-        return text_value(node, f"{key} of {name}", self._findings, limit=limit) or ""
+            message = f"scale of {name} has no effect: the variable has no topic"
+            self._findings.add("AMX6451", message, span, "write ros: out or ros: in too")
+        return scale_of(node, name, variable.type, span, self._findings, is_array=variable.is_array)

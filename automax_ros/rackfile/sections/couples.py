@@ -5,27 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.json_schema import Keys, Schema, number, section
+from automax_ros.core.json_schema import Keys, Schema, section
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.yaml_text import Node
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.coupling import LEAST_RATIO, MOST_RATIO, CouplingData
 from automax_ros.rackfile.model.plants import CoupleConfig, PlantConfig, build_plants, couple_plants, plant_name
-from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value, text_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_key, schemas, text_key
 
 CODE = "AMX6478"
-RANGES = {
-    "ratio": (LEAST_RATIO, MOST_RATIO),
-    "stiffness_nm_per_rad": (1.0, 1e7),
-    "damping_nms_per_rad": (0.0, 1e6),
-}
-"""Ranges of a coupling's numbers (decision)."""
-KEYS: Keys = {
-    "to": plant_name("The other plant."),
-    "ratio": number("Speed of this plant's motor over that of the other.", *RANGES["ratio"], 1),
-    "stiffness_nm_per_rad": number("Stiffness at this shaft; without it stiff.", *RANGES["stiffness_nm_per_rad"]),
-    "damping_nms_per_rad": number("Damping of the spring.", *RANGES["damping_nms_per_rad"]),
-}
+_TO = text_key("to", plant_name("The other plant."))
+_DAMPING = number_key("damping_nms_per_rad", "Damping of the spring.", 0.0, 1e6, CODE)
+NUMBERS = (
+    number_key("ratio", "Speed of this plant's motor over that of the other.", LEAST_RATIO, MOST_RATIO, CODE, 1),
+    number_key("stiffness_nm_per_rad", "Stiffness at this shaft; without it stiff.", 1.0, 1e7, CODE),
+    _DAMPING,
+)
+"""The numbers of a coupling, with ranges of ours (decision)."""
+KEYS: Keys = schemas(_TO, *NUMBERS)
 SCHEMA: Schema = section("What couples the shaft to that of another plant.", KEYS, ("to",))
 
 
@@ -38,19 +35,12 @@ def read_couple(node: Node, what: str, findings: ProblemList) -> CoupleConfig | 
     section = Section(entries, where, KEYS, findings)
     if not section.require(("to",), where, node.span, findings):
         return None
-    named = section.get("to")
-    text = text_value(named, f"to of {where}", findings, limit=100) if named is not None else None
-    numbers: dict[str, float] = {}
-    for key, (low, high) in RANGES.items():
-        value = section.get(key)
-        found = number_value(value, f"{key} of {where}", findings, low=low, high=high, code=CODE) if value else None
-        if found is not None:
-            numbers[key] = found
+    named, text, numbers = section.get("to"), section.read(_TO), section.read_all(NUMBERS)
     if text is None or named is None:
         return None
-    if "damping_nms_per_rad" in numbers and "stiffness_nm_per_rad" not in section:
+    if _DAMPING.name in numbers and "stiffness_nm_per_rad" not in section:
         message = f"{where} has a damping and no stiffness: a stiff shaft does not swing"
-        findings.add(CODE, message, section.key_span("damping_nms_per_rad"))
+        findings.add(CODE, message, section.key_span(_DAMPING.name))
     return CoupleConfig(findings.upper_case(text, named.span), CouplingData(**numbers), named.span.line)
 
 
@@ -62,7 +52,13 @@ def check_couples(plants: Mapping[str, PlantConfig], findings: ProblemList) -> N
         if config.couple is not None:
             _check(name, config.couple, plants, taken, findings)
     if findings.errors == before == 0:
-        _try(plants, findings)
+        made = build_plants(plants.values())
+        for config in plants.values():
+            try:
+                couple_plants(made, (config,))
+            except ParameterError as error:
+                assert config.couple is not None
+                findings.add(CODE, f"plant {config.name}: {error}", Span(config.couple.line, 1, 2))
 
 
 def _check(
@@ -84,14 +80,3 @@ def _check(
             message = f"plant {item} is coupled already (line {taken[item]})"
             findings.add(CODE, message, span, "a plant is coupled to one other, and one of the two says so")
     taken.update(dict.fromkeys((name, couple.to), couple.line))
-
-
-def _try(plants: Mapping[str, PlantConfig], findings: ProblemList) -> None:
-    """Report errors that appear only when the plants are built."""
-    made = build_plants(plants.values())
-    for config in plants.values():
-        try:
-            couple_plants(made, (config,))
-        except ParameterError as error:
-            assert config.couple is not None
-            findings.add(CODE, f"plant {config.name}: {error}", Span(config.couple.line, 1, 2))

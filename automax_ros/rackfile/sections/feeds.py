@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from automax_ros.core.diagnostics import Diagnostic, Note, Span
+from automax_ros.core.json_schema import Keys, Schema, entries, may_be_empty, section
 from automax_ros.core.names import PREDEFINED, Element, NameFault
 from automax_ros.core.names import element as element_named
-from automax_ros.core.text import near_or_listed, printable, quoted
+from automax_ros.core.text import near_or_listed, printable
 from automax_ros.core.types import DataType
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.drive.plant.signals import SIGNALS
@@ -15,13 +16,36 @@ from automax_ros.language.program import Program, places_that_write
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.plants import FeedConfig
-from automax_ros.rackfile.reading.names import VariableName
+from automax_ros.rackfile.reading.scale import SCHEMA as SCALE
 from automax_ros.rackfile.reading.scale import Scale, scale_of
-from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_value, report_twice, text_value
-from automax_ros.rackfile.sections.plant_keys import FEED_KEYS, LEAST_MS, MOST_MS, USUAL_MS
+from automax_ros.rackfile.reading.values import (
+    ProblemList,
+    Section,
+    choice_key,
+    entries_of,
+    number_key,
+    report_twice,
+    schemas,
+)
 
 CODE = "AMX6479"
 _ABSENT = "the rack has no common variable"
+_SIGNAL = choice_key(
+    "signal",
+    "What the instrument shows.",
+    {name: name for name in SIGNALS},
+    (CODE, "a plant has no signal {given}"),
+    lambda word: near_or_listed(word, SIGNALS),
+)
+_USUAL_MS = 1.0
+EVERY_MS = number_key("every_ms", "How often it is written, ms.", 0.1, 10_000.0, CODE, _USUAL_MS)
+"""Its range and its default are ours (decision: an instrument is quicker than most scans)."""
+KEYS: Keys = {**schemas(_SIGNAL, EVERY_MS), "scale": SCALE}
+"""The keys of a feed."""
+_FED = r"^[A-Za-z_][A-Za-z0-9_]{0,15}[%!]?\s*([(\[][0-9, ]*[)\]])?$"
+SCHEMA: Schema = may_be_empty(
+    entries("Signals of the plant into commons.", _FED, section("A feed.", KEYS, ("signal",)))
+)
 
 
 def read_feeds(
@@ -51,15 +75,15 @@ class _FeedReader:
         self._fed: dict[str, Span] = {}
 
     def read(self, plant: str, key: Scalar, node: Node) -> FeedConfig | None:
-        """Return one feed, None if a problem was reported."""
         findings = self._findings
         where = f"feed {printable(key.text)} of plant {plant}"
         entries = entries_of(node, where, findings)
         if entries is None:
             return None
-        section = Section(entries, where, FEED_KEYS, findings)
-        signal = self._signal(section, where, key.span)
-        every_ms = self._every_ms(section.get("every_ms"), where)
+        section = Section(entries, where, KEYS, findings)
+        section.require(("signal",), where, key.span, findings)
+        signal = section.read(_SIGNAL)
+        every_ms = section.read(EVERY_MS) if EVERY_MS.name in section else _USUAL_MS
         target = self._target(key, where)
         if target is None:
             return None
@@ -68,22 +92,6 @@ class _FeedReader:
             return None
         every_ns = round(every_ms * 1e6)
         return FeedConfig(plant, target.name, target.index, signal, every_ns, scale, key.span.line)
-
-    def _signal(self, section: Section, where: str, span: Span) -> str | None:
-        if not section.require(("signal",), where, span, self._findings):
-            return None
-        node = section.get("signal")
-        text = text_value(node, f"signal of {where}", self._findings, limit=100) if node is not None else None
-        if node is not None and text is not None and text not in SIGNALS:
-            message = f"a plant has no signal {quoted(text)}"
-            self._findings.add(CODE, message, node.span, near_or_listed(text, SIGNALS))
-            return None
-        return text
-
-    def _every_ms(self, node: Node | None, where: str) -> float | None:
-        if node is None:
-            return USUAL_MS
-        return number_value(node, f"every_ms of {where}", self._findings, low=LEAST_MS, high=MOST_MS, code=CODE)
 
     def _target(self, key: Scalar, where: str) -> Element[CommonVariable] | None:
         """Return the common that a feed writes, None (reported) if it may not."""
@@ -120,7 +128,7 @@ class _FeedReader:
         """Return the scale of the counts: the feed's, else the common's own (decision)."""
         node = section.get("scale")
         if node is not None:
-            return scale_of(node, VariableName(variable.name, variable.type, 0, ()), span, self._findings)
+            return scale_of(node, variable.name, variable.type, span, self._findings)
         if variable.type.is_integer and variable.scale is None:
             message = f"{where} has no scale: what is a count of {variable.name}?"
             hint = "for example scale: {counts: [-4095, 4095], value: [-1750.0, 1750.0]}"
@@ -131,14 +139,14 @@ class _FeedReader:
 def feed_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
     """Return the places where a task writes a common that a plant feeds (AMX6500), by task."""
     fed = {feed.common: feed for feed in config.feeds}
-    return {program.name: list(_written(config, fed, program)) for program in programs.values() if fed}
-
-
-def _written(config: RackConfig, fed: Mapping[str, FeedConfig], program: Program) -> Iterable[Diagnostic]:
-    for name, places in places_that_write(program).items():
-        feed = fed.get(name)
-        if feed is not None:
-            line, span = places[0]
-            message = f"{name} is written here, and plant {feed.plant} feeds it"
-            notes = (Note(f"its feed stands in line {feed.line} of {config.path.name}", span),)
-            yield Diagnostic("AMX6500", message, span, line, "a feed is an instrument: no task writes it", notes)
+    found: dict[str, list[Diagnostic]] = {}
+    for program in programs.values():
+        for name, places in places_that_write(program).items():
+            feed = fed.get(name)
+            if feed is not None:
+                line, span = places[0]
+                message = f"{name} is written here, and plant {feed.plant} feeds it"
+                notes = (Note(f"its feed stands in line {feed.line} of {config.path.name}", span),)
+                hint = "a feed is an instrument: no task writes it"
+                found.setdefault(program.name, []).append(Diagnostic("AMX6500", message, span, line, hint, notes))
+    return found

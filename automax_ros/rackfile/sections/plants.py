@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from typing import Any
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.json_schema import Keys, Schema, either, entries, may_be_empty, number, section, whole, words
+from automax_ros.core.json_schema import Keys, Schema, either, entries, may_be_empty, section, words
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.drive.base.errors import ParameterError
@@ -27,45 +28,47 @@ from automax_ros.rackfile.reading.values import (
     ProblemList,
     Section,
     entries_of,
-    integer_value,
-    number_value,
+    number_key,
     report_twice,
+    schemas,
     text_value,
+    whole_key,
 )
 from automax_ros.rackfile.sections.couples import SCHEMA as COUPLE_SCHEMA
 from automax_ros.rackfile.sections.couples import check_couples, read_couple
-from automax_ros.rackfile.sections.joint_keys import SCHEMA as JOINT_SCHEMA
-from automax_ros.rackfile.sections.joint_keys import GivenJoint, check_joint_names, read_joint
+from automax_ros.rackfile.sections.feeds import SCHEMA as FEED_SCHEMA
+from automax_ros.rackfile.sections.joints import SCHEMA as JOINT_SCHEMA
+from automax_ros.rackfile.sections.joints import GivenJoint, check_joint_names, read_joint
 from automax_ros.rackfile.sections.plant_keys import (
-    FEED_SCHEMA,
-    INERTIA_SCHEMA,
+    INERTIA,
     LOAD_HINTS,
     LOAD_SCHEMA,
     SUPPLY_SCHEMA,
-    read_inertia,
     read_load,
     read_supply,
 )
 
 MOST_PLANTS = 32
 """Most plants of a rack (decision: two for each of 16 slots)."""
-MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO = 115, 400
-"""Range of the Motor Overload Ratio in %: that of LIM_BAR, which must be the same (36)."""
-_LEAST, _MOST = 1e-9, 1e9
-_PLATE: Keys = {
-    "hp": number("Rated power, hp.", _LEAST, _MOST),
-    "volts": number("Rated armature voltage, V.", _LEAST, _MOST),
-    "rpm": number("Rated speed.", _LEAST, _MOST),
-    "amps": number("Rated armature current, A.", _LEAST, _MOST),
-    "resistance_ohm": number("Resistance of the armature.", _LEAST, _MOST),
-    "inductance_h": number("Inductance of the armature.", _LEAST, _MOST),
-    "inertia_kg_m2": number("Inertia of the motor.", _LEAST, _MOST),
-}
+_RATIO = whole_key("motor_overload_ratio", "Motor Overload Ratio of the drive, %.", 115, 400, "AMX6475")
+"""Its range is that of LIM_BAR, which must be the same (36)."""
+_PLATE = tuple(
+    number_key(name, text, 1e-9, 1e9, "AMX6473")
+    for name, text in (
+        ("hp", "Rated power, hp."),
+        ("volts", "Rated armature voltage, V."),
+        ("rpm", "Rated speed."),
+        ("amps", "Rated armature current, A."),
+        ("resistance_ohm", "Resistance of the armature."),
+        ("inductance_h", "Inductance of the armature."),
+        ("inertia_kg_m2", "Inertia of the motor."),
+    )
+)
 _PLATE_REQUIRED = ("hp", "volts", "rpm")
 _SIMULATED: Keys = {
     "line": SUPPLY_SCHEMA,
     "load": LOAD_SCHEMA,
-    "inertia": INERTIA_SCHEMA,
+    **schemas(INERTIA),
     "couple": COUPLE_SCHEMA,
     "feeds": FEED_SCHEMA,
     "joint": JOINT_SCHEMA,
@@ -74,9 +77,9 @@ KEYS: Keys = {
     "motor": either(
         "The motor; a plant without one is not simulated.",
         words("A motor that the emulator has.", MOTORS),
-        section("The motor's name plate.", _PLATE, _PLATE_REQUIRED),
+        section("The motor's name plate.", schemas(*_PLATE), _PLATE_REQUIRED),
     ),
-    "motor_overload_ratio": whole("Motor Overload Ratio of the drive, %.", MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO),
+    **schemas(_RATIO),
     **_SIMULATED,
 }
 """The keys of a plant."""
@@ -156,8 +159,8 @@ def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
     findings = plants.findings
     what = f"plant {name}"
     section = Section(entries_of(node, what, findings) or (), what, KEYS, findings, LOAD_HINTS)
-    ratio, motor = section.get("motor_overload_ratio"), section.get("motor")
-    line, load, inertia, couple, feeds, joint = (section.get(option) for option in _SIMULATED)
+    motor = section.get("motor")
+    line, load, couple, feeds, joint = (section.get(key) for key in ("line", "load", "couple", "feeds", "joint"))
     needless = next((option for option in _SIMULATED if option in section), "")
     if motor is None and needless:
         findings.add("AMX6009", f"{what} has {needless} and no motor: it is not simulated", section.key_span(needless))
@@ -168,30 +171,20 @@ def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
     config = PlantConfig(
         name,
         _motor(motor, f"motor of {what}", findings) if motor else None,
-        None if ratio is None else _ratio(ratio, what, findings),
+        section.read(_RATIO),
         key.span.line,
         read_supply(line, what, findings) if line else SupplyConfig(),
         read_load(load, what, findings) if load else LoadConfig(),
-        read_inertia(inertia, what, findings) if inertia else 1.0,
+        section.read(INERTIA) or 1.0,
         read_couple(couple, what, findings) if couple else None,
         plants.joints[-1].name if joint else "",
     )
     if not findings.errors:
-        _check_data(config, key.span, findings)
+        try:
+            plant_data(config)
+        except ParameterError as error:
+            findings.add("AMX6473", f"plant {name}: {error}", key.span)
     return config
-
-
-def _check_data(config: PlantConfig, span: Span, findings: ProblemList) -> None:
-    """Report a motor that contradicts itself or cannot be simulated."""
-    try:
-        plant_data(config)
-    except ParameterError as error:
-        findings.add("AMX6473", f"plant {config.name}: {error}", span)
-
-
-def _ratio(node: Node, what: str, findings: ProblemList) -> int | None:
-    low, high = MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO
-    return integer_value(node, f"motor_overload_ratio of {what}", findings, low=low, high=high, code="AMX6475")
 
 
 def _motor(node: Node, what: str, findings: ProblemList) -> str | NamePlate | None:
@@ -209,24 +202,8 @@ def _motor(node: Node, what: str, findings: ProblemList) -> str | NamePlate | No
 
 
 def _plate(node: Mapping, what: str, findings: ProblemList) -> NamePlate | None:
-    section = Section(node.entries, what, _PLATE, findings)
+    section = Section(node.entries, what, schemas(*_PLATE), findings)
     if not section.require(_PLATE_REQUIRED, what, node.span, findings):
         return None
-    numbers: dict[str, float] = {}
-    for key in _PLATE:
-        value = section.get(key)
-        if value is None:
-            continue
-        found = number_value(value, f"{key} of {what}", findings, low=_LEAST, high=_MOST, code="AMX6473")
-        if found is None:
-            return None
-        numbers[key] = found
-    return NamePlate(
-        hp=numbers["hp"],
-        volts=numbers["volts"],
-        rpm=numbers["rpm"],
-        amps=numbers.get("amps"),
-        resistance_ohm=numbers.get("resistance_ohm"),
-        inductance_h=numbers.get("inductance_h"),
-        inertia_kg_m2=numbers.get("inertia_kg_m2"),
-    )
+    numbers: dict[str, Any] = dict(section.read_all(_PLATE))
+    return NamePlate(**numbers) if all(key.name in numbers or key.name not in section for key in _PLATE) else None

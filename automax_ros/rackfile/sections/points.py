@@ -10,15 +10,18 @@ from automax_ros.core.types import DataType
 from automax_ros.rackfile.model.config import MAX_SLOT, Point
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.reading.names import VariableName
-from automax_ros.rackfile.reading.values import ProblemList, Section, integer_value
+from automax_ros.rackfile.reading.values import ProblemList, Section, integer_value, schemas, whole_key
 
+_SLOT = whole_key("slot", "Slot of the module that the point belongs to.", 0, MAX_SLOT, "AMX6421")
+_REGISTER = "Register of the module; a DOUBLE INTEGER takes this one and the next."
+_BIT = whole_key("bit", "Bit of the register, for a BOOLEAN; 0 is the lowest.", 0, 15, "AMX6421")
 KEYS: Keys = {
-    "slot": whole("Slot of the module that the point belongs to.", 0, MAX_SLOT),
+    **schemas(_SLOT),
     "drop": whole("Drop of a 57C404 whose register it is; 0 is the module's status.", 0, 55),
-    "register": whole("Register of the module; a DOUBLE INTEGER takes this one and the next.", 0, 65535),
-    "bit": whole("Bit of the register, for a BOOLEAN; 0 is the lowest.", 0, 15),
+    "register": whole(_REGISTER, 0, 65535),
+    **schemas(_BIT),
 }
-"""The keys of a point's place."""
+"""The keys of a point's place; a module has fewer drops and registers."""
 _SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32, DataType.REAL: 32}
 """Bits of the types that a point may have (J2-3045 p. 7-1); a REAL only on the application registers of a UDC."""
 
@@ -44,7 +47,7 @@ class PointReader:
         wanted = ("slot", "register", "bit") if declared.type is DataType.BOOLEAN else ("slot", "register")
         if not section.require(wanted, what, span, self._findings) or not self._is_possible(section, declared):
             return None
-        slot = self._number(section, "slot", what, 0, 15)
+        slot = section.read(_SLOT, what)
         module = self._module(slot, section, what) if slot is not None else None
         if slot is None or module is None:
             return None
@@ -55,8 +58,9 @@ class PointReader:
         first = self._first_register(section, module, what, span)
         if first is None:
             return None
-        number = self._number(section, "register", what, 0, (module.registers.area or module.registers.count) - words)
-        bit = self._number(section, "bit", what, 0, 15) if "bit" in section else None
+        last = (module.registers.area or module.registers.count) - words
+        number = section.read(whole_key("register", _REGISTER, 0, last, "AMX6421"), what)
+        bit = section.read(_BIT, what)
         if number is None or (bit is None and "bit" in section):
             return None
         register = first + number
@@ -117,7 +121,6 @@ class PointReader:
         return not message
 
     def _is_possible(self, section: Section, declared: VariableName) -> bool:
-        """Report points that are impossible: an array, a REAL or a string, non-volatile, a word with a bit."""
         message = ""
         place = section.key_span(next(key for key in KEYS if key in section))
         if declared.dimensions or declared.type not in _SIZES:
@@ -135,12 +138,6 @@ class PointReader:
     def _report_impossible(self, message: str, place: Span) -> None:
         hint = "an I/O point is a simple BOOLEAN (with slot, register, bit), INTEGER or DOUBLE INTEGER"
         self._findings.add("AMX6422", message, place, hint)
-
-    def _number(self, section: Section, key: str, what: str, low: int, high: int) -> int | None:
-        node = section.get(key)
-        if node is None:
-            return None
-        return integer_value(node, f"{key} of {what}", self._findings, low=low, high=high, code="AMX6421")
 
     def _module(self, slot: int, section: Section, what: str) -> ModuleConfig | None:
         module = self._modules.get(slot)

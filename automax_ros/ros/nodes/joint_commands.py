@@ -14,7 +14,7 @@ from typing import Any
 from automax_ros.core.types import Value
 from automax_ros.rackfile.model.plants import JointCommand
 from automax_ros.rackfile.model.ros_names import command_topic
-from automax_ros.rackfile.sections.joint_keys import INTERFACES, UNITS
+from automax_ros.rackfile.sections.joints import INTERFACES, UNITS
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.write_topic import ScaledWriter, subscribe_variable
 from automax_ros.runtime.memory.views import MemoryValueError

@@ -7,7 +7,7 @@ import pytest
 from rack.helpers import good, loaded
 
 from automax_ros.rackfile.reading.scale import Scale
-from automax_ros.rackfile.sections.joint_keys import INTERFACES
+from automax_ros.rackfile.sections.joints import INTERFACES
 
 HEAD = """\
 rack: LINE1

@@ -11,6 +11,7 @@ from rack.helpers import good
 from automax_ros.drive.plant.faults import VERBS, values_of
 from automax_ros.drive.plant.signals import SIGNALS
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.reading.values import schemas
 from automax_ros.rackfile.sections import couples, feeds
 from automax_ros.rackfile.sections import plant_keys as keys
 from automax_ros.rackfile.sections import plants as reading
@@ -29,7 +30,7 @@ def table(text: str, heading: str) -> dict[str, str]:
 def test_signals_and_verbs_are_all_there():
     assert list(table(PAGE, "Feeds")) == list(SIGNALS)
     assert list(table(PAGE, "What can break")) == list(VERBS)
-    assert sorted(table(PAGE, "Load")) == sorted([*keys.LOAD, "torque_per_rpm", "ros"])
+    assert sorted(table(PAGE, "Load")) == sorted([*schemas(*keys.LOAD), "torque_per_rpm", "ros"])
 
 
 @pytest.mark.parametrize("text", [PAGE, YAML_PAGE])
@@ -47,16 +48,17 @@ def test_the_rack_files_page_has_every_key_and_range():
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", YAML_PAGE, re.M))
     assert list(rows) == list(reading.KEYS)
     shown = {key: set(re.findall(r"\w+", row.split("|")[0])) for key, row in rows.items()}
-    assert shown["line"] == {*keys.SUPPLY, "rotation"}
-    assert shown["load"] == {*keys.LOAD, "torque_per_rpm", "ros", "or"}
+    assert shown["line"] == {*schemas(*keys.SUPPLY), "rotation"}
+    assert shown["load"] == {*schemas(*keys.LOAD), "torque_per_rpm", "ros", "or"}
     assert shown["couple"] == set(couples.KEYS)
-    assert set(keys.FEED_KEYS) <= shown["feeds"]
-    for key, ranges in (("line", keys.SUPPLY), ("load", keys.LOAD), ("couple", couples.RANGES)):
-        for low, high in ranges.values():
-            text = f"{low:g} to {high:g}".replace("e+0", "e")
-            assert text in rows[key].replace("10000 rpm", "10000"), (key, text)
-    assert f"{keys.LEAST_INERTIA:g} to {keys.MOST_INERTIA:g}" in rows["inertia"]
-    assert f"{feeds.LEAST_MS:g} to {feeds.MOST_MS:g} ms, {feeds.USUAL_MS:g}" in rows["feeds"]
+    assert set(feeds.KEYS) <= shown["feeds"]
+    numbers = [("line", item) for item in keys.SUPPLY] + [("load", item) for item in keys.LOAD]
+    numbers += [("couple", item) for item in couples.NUMBERS] + [("inertia", keys.INERTIA)]
+    for key, number in numbers:
+        text = f"{number.schema['minimum']:g} to {number.schema['maximum']:g}".replace("e+0", "e")
+        assert text in rows[key].replace("10000 rpm", "10000"), (key, text)
+    every = feeds.EVERY_MS.schema
+    assert f"{every['minimum']:g} to {every['maximum']:g} ms, {every['default']:g}" in rows["feeds"]
 
 
 def test_values_of_the_page_are_taken():
