@@ -112,11 +112,12 @@ def read_data(text: str, *, typed: bool = False, depth: int = MAX_DEPTH, nodes: 
     Raises:
         YamlFault: it is not YAML, has aliases, anchors or tags, or is too large.
     """
-    root = read_yaml(text, _raise, "such a file", depth, nodes)
+    root = read_yaml(text, raise_flaw, "such a file", depth, nodes)
     return _data(root, typed) if root is not None else None
 
 
-def _raise(flaw: Flaw, message: str, span: Span, hint: str | None) -> None:
+def raise_flaw(flaw: Flaw, message: str, span: Span, hint: str | None) -> None:
+    """Raise a flaw as YamlFault, as the ``report`` of a reader."""
     raise YamlFault(flaw, f"line {span.line}: {message}", hint)
 
 

@@ -12,8 +12,8 @@ from automax_ros.core.diagnostics import Span
 from automax_ros.core.json_schema import Schema
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.user_error import UserError
-from automax_ros.core.yaml_text import Flaw, Node, Scalar, YamlFault, read_yaml, yaml_of
 from automax_ros.core.yaml_text import Mapping as Keys
+from automax_ros.core.yaml_text import Node, Scalar, raise_flaw, read_yaml, yaml_of
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.sections.plants import KEYS
 
@@ -64,7 +64,7 @@ def with_numbers(text: str, values: Mapping[PlantNumber, str]) -> str:
     """
     if not values:
         return text
-    root = read_yaml(text, _raise)
+    root = read_yaml(text, raise_flaw)
     assert isinstance(root, Keys)
     for number, value in values.items():
         root = _with(root, ("plants", number.plant, *number.keys), value, number.label)
@@ -96,7 +96,3 @@ def _with(node: Node | None, keys: tuple[str, ...], value: str, label: str) -> K
 def _means(name: Scalar, keys: tuple[str, ...]) -> bool:
     """Return whether a key of the file is the first of ``keys``; names of plants may be in lower case in the file."""
     return name.text == keys[0] or name.text.upper() == keys[0]
-
-
-def _raise(flaw: Flaw, message: str, span: Span, hint: str | None) -> None:
-    raise YamlFault(flaw, f"line {span.line}: {message}", hint)

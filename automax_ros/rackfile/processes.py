@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.user_error import UserError
@@ -29,7 +29,6 @@ from automax_ros.language.program import Program
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.driven import driven_plants
-from automax_ros.rackfile.model.module import ModuleConfig
 
 HOME = "common_memory"
 """Name of the process with common memory, as that of its node, also if a lone Processor holds the commons."""
@@ -43,14 +42,10 @@ class NoSuchSeat(UserError):
 
 @dataclass(frozen=True)
 class RackProcess:
-    """A process of a distributed rack.
+    """A process of a distributed rack; ``slots`` and names of its ``modules`` are in the order of slots.
 
-    Attributes:
-        name: that of its first module, ``common_memory`` for the process with common memory.
-        slots: of its modules, in order.
-        holds_common_memory: then it alone publishes the rack's topics and receives the requests of operators.
-        modules: the names of its modules, in the order of slots.
-        reasons: why its modules share a process, a sentence each; () for a module alone.
+    Its name is that of its first module. The one that ``holds_common_memory`` has that as its name; it alone publishes
+    the rack's topics and receives the requests of operators. ``reasons`` are why its modules share a process.
     """
 
     name: str
@@ -74,9 +69,13 @@ def processes_of(config: RackConfig, programs: Iterable[Program] | None = None) 
     if programs is None:
         programs = [item.result.program for item in check_tasks(config) if item.result.program is not None]
     bonds = list(_bonds(config, list(programs)))
-    groups = _groups([module.slot for module in config.modules], [bond.slots for bond in bonds])
-    seats = (_seat(config, slots, bonds) for slots in groups)
-    return tuple(sorted(seats, key=lambda seat: (not seat.holds_common_memory, seat.slots)))
+    found = []
+    for slots in _groups([module.slot for module in config.modules], [bond.slots for bond in bonds]):
+        modules = tuple(module.name for module in config.modules if module.slot in slots)
+        is_home = config.common_memory_slot in slots
+        reasons = tuple(bond.reason for bond in bonds if bond.slots[0] in slots and len(set(bond.slots)) > 1)
+        found.append(RackProcess(HOME if is_home else modules[0], slots, is_home, modules, reasons))
+    return tuple(sorted(found, key=lambda process: (not process.holds_common_memory, process.slots)))
 
 
 def seat_named(seats: Sequence[RackProcess], text: str) -> RackProcess:
@@ -102,23 +101,26 @@ def _bonds(config: RackConfig, programs: Sequence[Program]) -> Iterator[_Bond]:
     names = {module.slot: module.name for module in config.modules}
     homes = {task.name: module.slot for module, task in config.placed_tasks}
     for program in programs:
-        yield from _loop_bonds(program, homes[program.name], names)
-        yield from _interrupt_bonds(program, homes[program.name], names, config)
-    yield from _wire_bonds(config.modules, names)
-    yield from _plant_bonds(config)
-    yield from _meeting_bonds(programs, homes)
+        yield from _task_bonds(program, homes[program.name], names, config)
+    for module in config.modules:
+        if module.drive is not None and module.drive in names:
+            yield _Bond((module.slot, module.drive), f"{module.name} has the armature voltage of {names[module.drive]}")
+    turned = {driven.name: driven for driven in driven_plants(config)}
+    for driven in turned.values():
+        couple = driven.config.couple
+        other = turned.get(couple.to) if couple is not None else None
+        if other is not None:
+            yield _Bond((driven.slot, other.slot), f"the shafts of {driven.name} and {other.name} are coupled")
+    yield from _exchange_bonds(programs, homes)
 
 
-def _loop_bonds(program: Program, slot: int, names: dict[int, str]) -> Iterator[_Bond]:
-    """Yield the modules that the current minor loop of a task commands at each interrupt."""
+def _task_bonds(program: Program, slot: int, names: dict[int, str], config: RackConfig) -> Iterator[_Bond]:
+    """Yield the modules that a task's current minor loop commands, and those whose interrupts set its events."""
     facts = program.cml.facts if program.cml is not None else {}
     for key, does in _LOOP_SLOTS.items():
         other = facts.get(key)
         if isinstance(other, int) and other in names:
             yield _Bond((slot, other), f"task {program.name} {does} {names[other]}")
-
-
-def _interrupt_bonds(program: Program, slot: int, names: dict[int, str], config: RackConfig) -> Iterator[_Bond]:
     for event in program.events:
         variable = config.by_name.get(event.interrupt_status.name) if event.interrupt_status is not None else None
         if variable is not None and variable.point is not None:
@@ -126,54 +128,26 @@ def _interrupt_bonds(program: Program, slot: int, names: dict[int, str], config:
             yield _Bond((slot, other), f"task {program.name} waits for the interrupt {event.name} of {names[other]}")
 
 
-@runtime_checkable
-class _Wired(Protocol):
-    @property
-    def drive(self) -> int | None: ...
-
-
-def _wire_bonds(modules: Iterable[ModuleConfig], names: dict[int, str]) -> Iterator[_Bond]:
-    for module in modules:
-        if isinstance(module, _Wired) and module.drive in names:
-            yield _Bond((module.slot, module.drive), f"{module.name} has the armature voltage of {names[module.drive]}")
-
-
-def _plant_bonds(config: RackConfig) -> Iterator[_Bond]:
-    turned = {driven.name: driven for driven in driven_plants(config)}
-    for driven in turned.values():
-        couple = driven.config.couple
-        other = turned.get(couple.to) if couple is not None else None
-        if other is not None:
-            yield _Bond((driven.slot, other.slot), f"the shafts of {driven.name} and {other.name} are coupled")
-
-
-def _meeting_bonds(programs: Sequence[Program], homes: dict[str, int]) -> Iterator[_Bond]:
-    met: dict[str, list[Program]] = {}
+def _exchange_bonds(programs: Sequence[Program], homes: dict[str, int]) -> Iterator[_Bond]:
+    shared: dict[str, list[Program]] = {}
     for program in programs:
         events = [f"the event {event.name}" for event in program.events]
         channels = [f"channel {file.number}" for file in program.files if file.direction is not None]
         for what in dict.fromkeys((*events, *channels)):
-            met.setdefault(what, []).append(program)
-    for what, group in met.items():
+            shared.setdefault(what, []).append(program)
+    for what, group in shared.items():
         slots = tuple(sorted({homes[program.name] for program in group}))
         if len(slots) > 1:
             yield _Bond(slots, f"tasks {' and '.join(program.name for program in group)} share {what}")
 
 
-def _groups(slots: Sequence[int], bonds: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
+def _groups(slots: Iterable[int], bonds: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
     """Return the slots in the smallest groups that contain every bond whole."""
     group = {slot: {slot} for slot in slots}
     for bond in bonds:
         joined = set().union(*(group[slot] for slot in bond))
         group.update(dict.fromkeys(joined, joined))
-    return list(dict.fromkeys(tuple(sorted(group[slot])) for slot in slots))
-
-
-def _seat(config: RackConfig, slots: tuple[int, ...], bonds: Iterable[_Bond]) -> RackProcess:
-    modules = tuple(module.name for module in config.modules if module.slot in slots)
-    holds_common_memory = config.common_memory_slot in slots
-    reasons = tuple(bond.reason for bond in bonds if bond.slots[0] in slots and len(set(bond.slots)) > 1)
-    return RackProcess(HOME if holds_common_memory else modules[0], slots, holds_common_memory, modules, reasons)
+    return list(dict.fromkeys(tuple(sorted(joined)) for joined in group.values()))
 
 
 def part_name(config: RackConfig, slots: Collection[int]) -> str:

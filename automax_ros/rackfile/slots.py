@@ -36,10 +36,8 @@ class SlotReader:
 
     def __init__(self, tasks: TaskReader, findings: ProblemList, executive: int, plants: Plants) -> None:
         """Create from the reader of tasks, which knows the names of the whole rack, and the Executive's version."""
-        self._executive, self._plants = executive, plants
-        self._tasks = tasks
-        self._findings = findings
-        self._standing: dict[int, PlacedModule] = {}
+        self._executive, self._plants, self._tasks, self._findings = executive, plants, tasks, findings
+        self._placed: dict[int, PlacedModule] = {}
         self._places: dict[int, Span] = {}
         self._complete = True
         self.unread: frozenset[int] = frozenset()
@@ -64,7 +62,7 @@ class SlotReader:
                 modules.append(module)
         in_order = tuple(sorted(modules, key=lambda item: item.slot))
         self.unread = frozenset(self._places) - {item.slot for item in modules}
-        rack = RackLayout(list(self._standing.values()), self._complete, span, self._findings, in_order)
+        rack = RackLayout(list(self._placed.values()), self._complete, span, self._findings, in_order)
         for kind in KINDS:
             kind.check_places(rack)
         return in_order
@@ -78,7 +76,7 @@ class SlotReader:
         if slot not in self._places:
             return slot
         first = self._places[slot]
-        held = f"holds {_described(self._standing[slot])}" if slot in self._standing else "is defined"
+        held = f"holds {_described(self._placed[slot])}" if slot in self._placed else "is defined"
         message = f"slot {slot} already {held} (line {first.line})"
         self._findings.add("AMX6201", message, key.span, notes=(Note("first defined here", first),))
         return None
@@ -94,8 +92,8 @@ class SlotReader:
         if model is None:
             return None
         kind = SUPPORTED[model]
-        standing = self._standing[slot] = PlacedModule(slot, model, kind, key.span)
-        known, what = ("module", *kind.options), _described(standing)
+        placed = self._placed[slot] = PlacedModule(slot, model, kind, key.span)
+        known, what = ("module", *kind.options), _described(placed)
         section = Section(node.entries, what, known, self._findings, owner=f"{what} in slot {slot}")
         return kind.read(ModuleSection(slot, model, section, key.span, self._tasks, self._executive, self._plants))
 
@@ -122,5 +120,5 @@ class SlotReader:
         return None
 
 
-def _described(standing: PlacedModule) -> str:
-    return f"{standing.kind.word} {standing.model}"
+def _described(placed: PlacedModule) -> str:
+    return f"{placed.kind.word} {placed.model}"

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import shutil
-from pathlib import Path
 
 import pytest
 
 from automax_ros.cli.main import main
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
-from automax_ros.scenario.stimuli.player import StimuliPlayer
-from automax_ros.scenario.stimuli.reader import read_for_rack
+from config.examples import CONFIG, built, play
 
-FOLDER = Path(__file__).parents[2] / "config" / "dc_drive"
+FOLDER = CONFIG / "dc_drive"
 TURN_RPM = 1200
 COUNTS_A_RPM = 4095 / 1750
 
 
-def built(folder: Path = FOLDER) -> Rack:
-    result = load(folder / "rack.yaml")
-    assert result.diagnostics == []
-    assert result.config is not None
-    rack = Rack(result.config)
-    assert rack.warnings == []
+def started(set_point: int, seconds: float = 7.0) -> Rack:
+    """The rack some time after its start with a set-point of speed, in rpm."""
+    rack = built(FOLDER)
+    rack.start([("SPEED_SP%", set_point)])
+    run_to(rack, seconds)
     return rack
 
 
@@ -34,34 +30,12 @@ def run_to(rack: Rack, seconds: float) -> None:
 @pytest.fixture(scope="module")
 def tour() -> dict[float, dict[str, object]]:
     """The values of the simple commons at the instants of the README's table."""
-    rack = built()
-    read = read_for_rack(FOLDER / "tour.yaml", rack)
-    assert read.stimuli is not None
-    played = StimuliPlayer(read.stimuli, rack.scheduler)
-    rack.start()
-    played.begin()
+    rack = built(FOLDER)
+    play(rack, FOLDER / "tour.yaml")
     names = [item.name for item in rack.config.variables if not item.dimensions and not item.name.endswith("$")]
     seen = {}
-    for instant in (
-        0.9,
-        1.1,
-        1.3,
-        3.0,
-        6.9,
-        7.3,
-        9.9,
-        12.1,
-        12.2,
-        17.0,
-        19.9,
-        22.9,
-        25.9,
-        26.2,
-        28.9,
-        29.1,
-        31.4,
-        39.9,
-    ):
+    first = (0.9, 1.1, 1.3, 3.0, 6.9, 7.3, 9.9, 12.1, 12.2)
+    for instant in (*first, 17.0, 19.9, 22.9, 25.9, 26.2, 28.9, 29.1, 31.4, 39.9):
         run_to(rack, instant)
         seen[instant] = {name: rack.value(name) for name in names if ":" not in name}
     seen[40.0] = {"errors": [(entry.code, entry.scan) for entry in rack.task("CML").errors.entries]}
@@ -112,10 +86,8 @@ def test_a_shorted_scr_is_found_at_the_next_start_and_reset(tour):
 
 @pytest.mark.parametrize(("set_point", "number"), [(1200, 1), (1200, 4), (300, 6), (-900, 13)])
 def test_diag_names_an_open_gate(set_point, number):
-    rack = built()
-    rack.start([("SPEED_SP%", set_point)])
+    rack = started(set_point)
     circuit = rack.plants["MOTOR"].circuit
-    run_to(rack, 7.0)
     assert (rack.value("OPEN_GATE%"), rack.value("LOST_PHASE%")) == (0, 0)
     circuit.open_gate(number)
     run_to(rack, 9.2)
@@ -128,9 +100,7 @@ def test_diag_names_an_open_gate(set_point, number):
 
 @pytest.mark.parametrize(("set_point", "terminal"), [(1200, 1), (1200, 2), (300, 3), (-900, 1)])
 def test_diag_names_a_missing_phase(set_point, terminal):
-    rack = built()
-    rack.start([("SPEED_SP%", set_point)])
-    run_to(rack, 7.0)
+    rack = started(set_point)
     rack.plants["MOTOR"].circuit.open_phase(terminal - 1)
     run_to(rack, 9.2)
     assert (rack.value("LOST_PHASE%"), rack.value("OPEN_GATE%")) == (terminal, 0)
@@ -140,9 +110,7 @@ def test_diag_names_a_missing_phase(set_point, terminal):
 @pytest.mark.parametrize("terminal", [1, 2, 3])
 def test_diag_names_a_missing_phase_under_a_great_current(terminal):
     """At 300 rpm with the rated torque what is left of the current never ends: it is least where it begins."""
-    rack = built()
-    rack.start([("SPEED_SP%", 300)])
-    run_to(rack, 5.0)
+    rack = started(300, 5.0)
     rack.plants["MOTOR"].load_torque_nm = 600.0
     run_to(rack, 7.5)
     assert rack.value("CUR_FB%") > 2500
@@ -153,9 +121,7 @@ def test_diag_names_a_missing_phase_under_a_great_current(terminal):
 
 
 def test_a_runaway_load_trips_the_overspeed_fault():
-    rack = built()
-    rack.start([("SPEED_SP%", 1700)])
-    run_to(rack, 7.0)
+    rack = started(1700)
     assert rack.value("F_OSV@") is False
     rack.plants["MOTOR"].load_torque_nm = -1500.0
     run_to(rack, 8.0)
@@ -165,15 +131,13 @@ def test_a_runaway_load_trips_the_overspeed_fault():
 
 @pytest.mark.parametrize("set_point", [1750, -1750])
 def test_the_largest_set_point_is_kept_by_a_regulator_that_sees_what_lies_above_it(set_point):
-    rack = built()
-    rack.start([("SPEED_SP%", set_point)])
-    run_to(rack, 12.0)
+    rack = started(set_point, 12.0)
     assert abs(rack.value("RPM") - set_point) < 10
     assert rack.value("FAULT@") is False
 
 
 def test_an_emergency_stop_lets_it_coast_and_needs_a_new_start():
-    rack = built()
+    rack = built(FOLDER)
     rack.start()
     run_to(rack, 6.0)
     rack.write("ESTOP_OK@", False)

@@ -3,7 +3,6 @@
 import itertools
 import math
 import re
-from pathlib import Path
 
 import pytest
 
@@ -11,14 +10,11 @@ from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value, bare_name
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.ros_names import set_topic
-from automax_ros.runtime.memory.views import WriteGroup
-from automax_ros.runtime.scan.scan_record import ScanRecord
-from automax_ros.runtime.tasks.task import Task
+from config.examples import CONFIG, loaded
 
-FOLDER = Path(__file__).parents[2] / "config" / "section_drive"
+FOLDER = CONFIG / "section_drive"
 README = (FOLDER / "README.md").read_text(encoding="utf-8")
 SCAN_S = 0.011
 SEQUENCE_SCAN_S = 0.055
@@ -29,10 +25,7 @@ AT_CRUISE_S = 20.0
 
 @pytest.fixture(scope="module")
 def config() -> RackConfig:
-    result = load(FOLDER / "rack.yaml")
-    assert result.diagnostics == []
-    assert result.config is not None
-    return result.config
+    return loaded(FOLDER)
 
 
 @pytest.fixture
@@ -97,7 +90,7 @@ def test_tasks_check_without_a_word(config):
 def test_variables_are_described():
     text = (FOLDER / "rack.yaml").read_text(encoding="utf-8")
     entries = re.findall(r"^  ([A-Z_]+[%@!]): \{(.*)\}$", text, re.M)
-    assert len(entries) == len(load(FOLDER / "rack.yaml").config.variables)
+    assert len(entries) == len(loaded(FOLDER).variables)
     assert [name for name, options in entries if "ros: " not in options or 'description: "' not in options] == []
     assert [name for name, options in entries if not name.endswith("@") and "unit: " not in options] == []
 
@@ -400,11 +393,11 @@ class Log:
     def __init__(self) -> None:
         self.entries: list[object] = []
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
+    def scanned(self, task, record, writes) -> None:
         self.entries += [task.name, repr(record)]
         self.written(writes)
 
-    def written(self, writes: list[WriteGroup]) -> None:
+    def written(self, writes) -> None:
         self.entries += [entry for group in writes for entry in group.entries()]
 
     def operated(self, operation) -> None:
@@ -417,10 +410,9 @@ def test_two_runs_write_the_same(config):
         rack, log = Rack(config), Log()
         rack.observe(log)
         rack.start()
-        rack.run(20.0)
-        rack.write("DRAW%", 10100)
-        rack.run(10.0)
-        rack.write("STOP_PB@", True)
+        for seconds, name, value in ((20.0, "DRAW%", 10100), (10.0, "STOP_PB@", True)):
+            rack.run(seconds)
+            rack.write(name, value)
         rack.run(30.0)
         logs.append(log.entries)
     assert len(logs[0]) > 50_000

@@ -1,38 +1,32 @@
 """The example of two racks does what its README says."""
 
-from pathlib import Path
-
 import pytest
 from rack.modules.network_racks import Cable
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.loader import load
-from automax_ros.scenario.stimuli.player import StimuliPlayer
-from automax_ros.scenario.stimuli.reader import read_for_rack
+from config.examples import CONFIG, loaded, play
 
-FOLDER = Path(__file__).parents[2] / "config" / "two_racks"
+FOLDER = CONFIG / "two_racks"
 CRUISE, WINDER_CRUISE = 2457, 2481
 """Counts of the preset 1500 fpm, 1500 * 4095 / 2500, and 1 % more."""
 CYCLE_S = 0.0055
 
 
-def built(name: str) -> Rack:
-    result = load(FOLDER / name / "rack.yaml")
-    assert result.diagnostics == []
-    assert result.config is not None
-    assert [item.result.diagnostics for item in check_tasks(result.config)] == [[]]
-    return Rack(result.config)
+def checked(name: str) -> Rack:
+    config = loaded(FOLDER / name)
+    assert [item.result.diagnostics for item in check_tasks(config)] == [[]]
+    return Rack(config)
 
 
 @pytest.fixture
 def line() -> Rack:
-    return built("line")
+    return checked("line")
 
 
 @pytest.fixture
 def winder() -> Rack:
-    return built("winder")
+    return checked("winder")
 
 
 def cycles(seconds: float) -> int:
@@ -71,11 +65,7 @@ def test_neither_starts_without_the_other(line, winder):
 
 
 def test_the_winder_alone_with_its_stimuli(winder):
-    read = read_for_rack(FOLDER / "winder" / "line.yaml", winder)
-    assert read.stimuli is not None
-    played = StimuliPlayer(read.stimuli, winder.scheduler)
-    winder.start()
-    played.begin()
+    played = play(winder, FOLDER / "winder" / "line.yaml")
     winder.run(19.9)
     assert winder.value("WIND_SPEED%") == WINDER_CRUISE
     winder.run(10.1)

@@ -18,41 +18,33 @@ from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.cpu_load import faults, loads_of
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.write.recorder import Recorder
-from automax_ros.scenario.stimuli.player import StimuliPlayer
-from automax_ros.scenario.stimuli.reader import read_for_rack
+from config.examples import CONFIG, built, loaded, play
 
-FOLDER = Path(__file__).parents[2] / "config" / "web_line"
+FOLDER = CONFIG / "web_line"
 START, WEB_BREAK = "start.yaml", "web_break.yaml"
-
-
-def loaded(folder: Path = FOLDER):
-    result = load(folder / "rack.yaml")
-    assert result.diagnostics == []
-    assert result.config is not None
-    return result.config
-
-
-def built(folder: Path = FOLDER) -> Rack:
-    rack = Rack(loaded(folder))
-    assert rack.warnings == []
-    return rack
-
-
-def begin(rack: Rack, stimuli: str) -> None:
-    read = read_for_rack(FOLDER / stimuli, rack)
-    assert read.stimuli is not None
-    played = StimuliPlayer(read.stimuli, rack.scheduler)
-    rack.start()
-    played.begin()
 
 
 def playing(stimuli: str, folder: Path = FOLDER) -> Rack:
     """The rack in RUN with the stimuli about to happen."""
     rack = built(folder)
-    begin(rack, stimuli)
+    play(rack, FOLDER / stimuli)
     return rack
+
+
+class Observer:
+    """Keeps the records of all scans, by task."""
+
+    def __init__(self, rack: Rack) -> None:
+        self.records: dict[str, list] = {}
+        rack.observe(self)
+
+    def __getattr__(self, _name):
+        return lambda *_arguments: None
+
+    def scanned(self, task, record, _writes):
+        if record.scan:
+            self.records.setdefault(task.name, []).append(record)
 
 
 def values(rack: Rack, seconds: float, *names: str) -> list[object]:
@@ -66,7 +58,7 @@ def without_errors(rack: Rack) -> None:
 
 
 def test_its_tasks_are_right_and_fit():
-    config = loaded()
+    config = loaded(FOLDER)
     checked = check_tasks(config)
     assert [item.result.diagnostics for item in checked] == [[]] * 8
     loads = loads_of(config, checked)
@@ -79,7 +71,7 @@ def test_its_tasks_are_right_and_fit():
 
 def test_time_of_wind_a_by_hand():
     """Table 5: five commons of the dual port, three INTEGER and two BOOLEAN; two tasks share the module."""
-    udc = loads_of(loaded(), check_tasks(loaded()))[-1]
+    udc = loads_of(loaded(FOLDER), check_tasks(loaded(FOLDER)))[-1]
     expected = (
         (350.00 + 3 * 2.20 + 2 * 2.00)  # SCAN_LOOP
         + 7.97  # DIFFERENCE
@@ -140,41 +132,24 @@ def test_a_web_break():
 
 def test_winder_scans_when_the_udc_interrupts():
     """After every fifth scan of the UDC, which scans every 2 ms; its scan then takes its time."""
-    seen: dict[str, list[int]] = {"WINDER": [], "WIND_B": []}
-
-    class Observer:
-        def __getattr__(self, _name):
-            return lambda *_arguments: None
-
-        def scanned(self, task, record, _writes):
-            if task.name in seen and record.scan:
-                seen[task.name].append(record.time_ns)
-
     rack = playing(START)
-    rack.observe(Observer())
+    seen = Observer(rack)
     rack.run(0.2)
-    scans = seen["WINDER"]
+    scans = [record.time_ns for record in seen.records["WINDER"]]
     assert len(scans) in (19, 20)
     assert {after - before for before, after in itertools.pairwise(scans)} == {10_000_000}
-    assert len(seen["WIND_B"]) == 100
+    assert len(seen.records["WIND_B"]) == 100
 
 
 def test_modeled_scans_take_what_load_says():
     """Of tasks that nothing pre-empts the most holds too; MOTORS and SECTION may have to wait."""
-    durations: dict[str, set[int]] = {}
-
-    class Observer:
-        def __getattr__(self, _name):
-            return lambda *_arguments: None
-
-        def scanned(self, task, record, _writes):
-            if record.scan and task.name != "DIAG":
-                durations.setdefault(task.name, set()).add(record.duration_ns)
-
     rack = playing(START)
-    rack.observe(Observer())
+    seen = Observer(rack)
     rack.run(2.0)
-    config = loaded()
+    durations = {
+        name: {item.duration_ns for item in records} for name, records in seen.records.items() if name != "DIAG"
+    }
+    config = loaded(FOLDER)
     times = {task.task: task.times for item in loads_of(config, check_tasks(config)) for task in item.tasks}
     for name, taken in durations.items():
         assert times[name].least_ns <= min(taken), name
@@ -250,16 +225,8 @@ def digest(folder: Path) -> dict[str, str]:
 
 
 def recorded(folder: Path, seconds: float) -> dict[str, str]:
-    arguments = [
-        "--simulated",
-        "--duration",
-        str(seconds),
-        "--stimuli",
-        str(FOLDER / WEB_BREAK),
-        "--record",
-        str(folder),
-    ]
-    assert main(["run", str(FOLDER), *arguments]) == 0
+    arguments = ["--simulated", "--duration", str(seconds), "--stimuli", str(FOLDER / WEB_BREAK)]
+    assert main(["run", str(FOLDER), *arguments, "--record", str(folder)]) == 0
     return digest(folder)
 
 
@@ -272,11 +239,11 @@ def test_recordings_are_identical_and_replay_bit_for_bit(tmp_path, capsys):
 
 def recorded_in_parts(folder: Path, seconds: float, parts: int) -> tuple[dict[str, str], list[int]]:
     """Record a run; return what is in the recording, and the memory in use after each part of the run."""
-    rack = built()
+    rack = built(FOLDER)
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, folder)
     stream.begin()
-    begin(rack, START)
+    play(rack, FOLDER / START)
     sizes = []
     for part in range(1, parts + 1):
         rack.scheduler.run_until(round(seconds * 1e9) * part // parts)

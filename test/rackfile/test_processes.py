@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from config.examples import CONFIG, loaded
 from hypothesis import given
 from hypothesis import strategies as st
 from rack.drives.drive_tasks import CML, folder_of
@@ -15,7 +16,6 @@ from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.processes import HOME, NoSuchSeat, _groups, processes_of, seat_named
 
-ROOT = Path(__file__).parents[2]
 IDLE = "10 CALL SCAN_LOOP(TICKS=2)\n20 END\n"
 SETS = "10 EVENT NAME=GO\n20 SET GO\n30 STOP\n40 END\n"
 WAITS = "10 EVENT NAME=GO\n20 WAIT ON GO\n30 STOP\n40 END\n"
@@ -95,8 +95,7 @@ def test_an_interrupt_keeps_its_module_with_the_processor_that_waits_for_it(tmp_
 
 
 def test_the_web_line_keeps_its_winder_with_the_udc_that_interrupts():
-    config = load(ROOT / "config" / "web_line" / "rack.yaml").config
-    assert config is not None
+    config = loaded(CONFIG / "web_line")
     assert slots_of(config) == [(0,), (1,), (2,), (3, 10), (5,), (6,), (7,), (8,)]
 
 
@@ -146,15 +145,13 @@ def test_a_reload_that_would_join_processes_is_refused(tmp_path):
 
 @pytest.mark.parametrize("text", ["3", "processor_3", " PROCESSOR_3 ", "10", "udc_10"])
 def test_a_seat_is_named_by_slot_or_module(text):
-    config = load(ROOT / "config" / "web_line" / "rack.yaml").config
-    assert config is not None
+    config = loaded(CONFIG / "web_line")
     assert seat_named(processes_of(config), text).name == "processor_3"
 
 
 @pytest.mark.parametrize(("text", "hint"), [("4", None), ("procesor_3", "did you mean processor_3?")])
 def test_a_module_that_is_not_there_is_refused(text, hint):
-    config = load(ROOT / "config" / "web_line" / "rack.yaml").config
-    assert config is not None
+    config = loaded(CONFIG / "web_line")
     with pytest.raises(NoSuchSeat) as told:
         seat_named(processes_of(config), text)
     assert f"no module '{text}'" in told.value.message

@@ -32,7 +32,9 @@ def test_modules_stand_in_the_order_of_slots_with_their_ticks_and_tasks(tmp_path
     (tmp_path / "line.blk").write_text("10 END\n")
     rack = good(tmp_path, TWO_PROCESSORS)
     assert (rack.name, rack.namespace, rack.operator) == ("LINE1", "line1", True)
-    assert rack.modules[0] == CommonMemoryConfig(0, "57C413", 4)
+    assert rack.modules[0] == CommonMemoryConfig(
+        slot=0, model="57C413", name="common_memory", line=4, common_registers=65536, has_battery=True
+    )
     assert [(item.slot, item.model, item.tick_ns) for item in rack.task_modules] == [
         (1, "57C435", 5_500_000),
         (2, "57C431", 500_000),

@@ -86,9 +86,3 @@ def test_cure_is_a_rack_without_problems(code, tmp_path):
     assert codes_of(result) == set()
     assert code not in FORGOTTEN or codes_of(result, whole=True) == set()
     assert result.config is not None
-
-
-@pytest.mark.parametrize("code", CODES)
-def test_page_begins_with_code_and_title(code):
-    text = (PAGES / f"{code}.md").read_text(encoding="utf-8")
-    assert text.splitlines()[0] == f"# {code}: {PROBLEMS[code].title}"

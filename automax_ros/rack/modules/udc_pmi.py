@@ -16,7 +16,6 @@ from automax_ros.drive.pmi.pmi import Commands, Pmi
 from automax_ros.rack.modules.io_module import OwnRegisters
 from automax_ros.rack.modules.module import ModuleState
 from automax_ros.rack.tasks.services import RackServices
-from automax_ros.rackfile.model.driven import Driving
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.udc import RAIL_COUNTERS
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
@@ -29,7 +28,7 @@ class UdcPmis:
         self, config: ModuleConfig, parts: RackServices, own: OwnRegisters, commanded: Callable[[str], bool]
     ) -> None:
         """Connect the PMIs; ``commanded`` returns whether a task that commands a drive scans."""
-        plants = config.plants if isinstance(config, Driving) else {}
+        plants = config.plants
         self._name, self._parts, self._commanded = config.name, parts, commanded
         self.read, self.show, self.post = own.read, own.show, parts.scheduler.at
         self._key = EventKey(EventClass.IO, config.slot, "link")

@@ -29,7 +29,7 @@ from automax_ros.language.tree.tree import (
     Statement,
 )
 from automax_ros.language.tree.walk import expressions_of, jumps_of, statements_in_order, targets_of, variables_in
-from automax_ros.rackfile.model.config import CommonVariable, RackConfig
+from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.modules.drive import DriveConfig
 
 _NAMED = 6
@@ -41,11 +41,6 @@ class _Write(NamedTuple):
     target: Reference | Element
     line: int
     is_constant: bool
-
-
-class _Read(NamedTuple):
-    task: str
-    line: int | None
 
 
 def writer_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
@@ -85,16 +80,20 @@ def rack_warnings(config: RackConfig, programs: Mapping[str, Program]) -> list[D
 
 def _unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
     files = {task.name: task.file.name for _, task in config.placed_tasks}
-    written = {name for program in programs.values() for name in _ever_written(program)} | _supplied(config)
-    reads: dict[str, _Read] = {}
+    written = _connected(config)
+    written |= {item.name for item in config.declared if item.direction is Direction.IN or item.preset is not None}
+    for program in programs.values():
+        written |= {target.name for target, _, _ in _targets(program, (*program.startup, *program.scan))}
+    reads: dict[str, tuple[str, int | None]] = {}
     for name, program in programs.items():
         for common, line in _reads(program):
-            reads.setdefault(common, _Read(name, line))
+            reads.setdefault(common, (files[name], line))
     for variable in config.declared:
         read = reads.get(variable.name)
         if read is not None and variable.name not in written and variable.point is None:
-            place = f"line {read.line} of {files[read.task]}"
-            message = f"{variable.name} is read in {place}, and nobody writes it: it stays {_zero(variable)}"
+            zero = {"BOOLEAN": "FALSE", "STRING": "empty"}.get(variable.type.word, "0")
+            place = f"line {read[1]} of {read[0]}"
+            message = f"{variable.name} is read in {place}, and nobody writes it: it stays {zero}"
             hint = "let a task write it; or write ros: in for what comes from outside, or a preset"
             yield Diagnostic("AMX6496", message, _place(config, variable.line), hint=hint)
 
@@ -130,11 +129,6 @@ def _without_plant(config: RackConfig, programs: Mapping[str, Program]) -> Itera
             yield Diagnostic("AMX6498", message, _place(config, drive.line), hint=hint)
 
 
-def _supplied(config: RackConfig) -> set[str]:
-    given = {item.name for item in config.declared if item.direction is Direction.IN or item.preset is not None}
-    return given | _connected(config)
-
-
 def _connected(config: RackConfig) -> set[str]:
     return {*PREDEFINED, *(feed.common for feed in config.feeds), *(item.common for item in config.joint_commands)}
 
@@ -143,11 +137,6 @@ def _place(config: RackConfig, line: int) -> Span:
     text = config.text.split("\n")[line - 1]
     start = len(text) - len(text.lstrip())
     return Span(line, start + 1, start + 1 + len(re.split(r"[\s:]", text[start:])[0]))
-
-
-def _zero(variable: CommonVariable) -> str:
-    word = variable.type.word
-    return {"BOOLEAN": "FALSE", "STRING": "empty"}.get(word, "0")
 
 
 def _same(first: list[_Write], second: list[_Write]) -> tuple[_Write, _Write] | None:
@@ -178,10 +167,6 @@ def _writes(program: Program) -> Iterator[_Write]:
             and (isinstance(target, Element) or not symbol.dimensions)
         ):
             yield _Write(program.name, target, line or 0, isinstance(value, BooleanLiteral))
-
-
-def _ever_written(program: Program) -> set[str]:
-    return {target.name for target, _, _ in _targets(program, (*program.startup, *program.scan))}
 
 
 def _targets(

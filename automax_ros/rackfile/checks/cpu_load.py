@@ -10,7 +10,6 @@ from automax_ros.compile.base.cost import MOST_SHARED_TICKS
 from automax_ros.compile.scan_times import ScanTimes, period_ns, scan_times
 from automax_ros.core.diagnostics import Diagnostic, Span
 from automax_ros.core.ticks import NS_PER_US
-from automax_ros.language.program import Program
 from automax_ros.rackfile.checks.drive_rules import latched_registers
 from automax_ros.rackfile.checks.tasks import CheckedTask
 from automax_ros.rackfile.model.config import RackConfig
@@ -72,29 +71,31 @@ class ModuleLoad:
 def loads_of(config: RackConfig, checked: Iterable[CheckedTask]) -> list[ModuleLoad]:
     """Return the loads of all modules that run tasks, in the order of slots; tasks with errors are left out."""
     programs = {item.task.name: item.result.program for item in checked}
-    return [_load_of(config, module, programs) for module in config.task_modules]
-
-
-def _load_of(config: RackConfig, module: ModuleConfig, programs: Mapping[str, Program | None]) -> ModuleLoad:
-    model = cost_model(module)
-    tasks = tuple(
-        TaskLoad(
-            task.name,
-            scan_times(program, model),
-            period_ns(program),
-            program.cml is not None,
-            Counter(point.slot for _, point, _ in latched_registers(config, program)),
+    found = []
+    for module in config.task_modules:
+        tasks = tuple(
+            TaskLoad(
+                task.name,
+                scan_times(program, cost_model(module)),
+                period_ns(program),
+                program.cml is not None,
+                Counter(point.slot for _, point, _ in latched_registers(config, program)),
+            )
+            for task in module.tasks
+            if (program := programs[task.name]) is not None
         )
-        for task in module.tasks
-        if (program := programs[task.name]) is not None
-    )
-    return ModuleLoad(module, SUPPORTED[module.model].models[module.model], tasks)
+        found.append(ModuleLoad(module, SUPPORTED[module.model].models[module.model], tasks))
+    return found
 
 
 def faults(config: RackConfig, loads: Iterable[ModuleLoad]) -> list[Diagnostic]:
     """Return the diagnostics of a rack's loads, each at the place of its module in the rack file."""
-    known = list(loads)
-    return [*_old_executive(config), *(found for load in known for found in _overload(load)), *late_loops(known)]
+    known, old = list(loads), []
+    if config.executive < TABLES_SINCE:
+        version, since = version_text(config.executive), version_text(TABLES_SINCE)
+        message = f"the tables of execution times hold from executive {since} on; this rack has {version}"
+        old = [Diagnostic("AMX6772", message, Span(1, 1, 2), hint="take the times as a guess")]
+    return [*old, *(found for load in known for found in _overload(load)), *late_loops(known)]
 
 
 def late_loops(loads: Iterable[ModuleLoad]) -> Iterator[Diagnostic]:
@@ -106,14 +107,6 @@ def late_loops(loads: Iterable[ModuleLoad]) -> Iterator[Diagnostic]:
             message = f"{task.task} takes {took:.0f} us on {load.word}, more than {due}"
             hint = "its DELTA counts one scan later: let another task do what it can, or take a faster Processor"
             yield Diagnostic("AMX6774", message, Span(load.module.line, 1, 2), hint=hint)
-
-
-def _old_executive(config: RackConfig) -> list[Diagnostic]:
-    if config.executive >= TABLES_SINCE:
-        return []
-    version, since = version_text(config.executive), version_text(TABLES_SINCE)
-    message = f"the tables of execution times hold from executive {since} on; this rack has {version}"
-    return [Diagnostic("AMX6772", message, Span(1, 1, 2), hint="take the times as a guess")]
 
 
 def _overload(load: ModuleLoad) -> list[Diagnostic]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 from automax_ros.compile.base.cost import CostModel, Model
 from automax_ros.compile.base.functions import BUILTINS
@@ -25,7 +24,6 @@ from automax_ros.language.tree.tree import Assignment, Expression, FunctionCall,
 from automax_ros.language.tree.walk import statements_in_order
 from automax_ros.rackfile.checks.register_writes import numbered_writes
 from automax_ros.rackfile.model.config import Point, RackConfig, Timing
-from automax_ros.rackfile.model.driven import Driving
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.plants import PlantConfig, plant_data
 from automax_ros.rackfile.modules.drive import DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
@@ -37,14 +35,9 @@ SLOT = "IO_CNTL_SLOT"
 
 @dataclass(frozen=True)
 class RackDrive:
-    """One drive of a rack.
+    """One drive of a rack: its module, None if the task names an empty slot, and its plant.
 
-    Attributes:
-        module: the module that drives it; None if the task names an empty slot.
-        slot: its slot.
-        letter: A or B if the module has two drives, otherwise "".
-        plant: its plant, None for a drive without one.
-        program: the task with its current minor loop, None if there is none.
+    ``letter`` is A or B if the module has two drives, otherwise ""; ``program`` the task with its current minor loop.
     """
 
     module: ModuleConfig | None
@@ -87,21 +80,17 @@ def rack_drives(config: RackConfig, programs: Iterable[Program]) -> list[RackDri
 
     ``programs`` are the rack's tasks without errors.
     """
-    loops = {slot: program for program in programs if (slot := _slot_of(program)) is not None}
+    slots = ((program.cml.facts.get(SLOT.lower()), program) for program in programs if program.cml is not None)
+    loops = {slot: program for slot, program in slots if isinstance(slot, int)}
     found: list[RackDrive] = []
     for module in config.modules:
         loop = loops.pop(module.slot, None)
-        plants = module.plants if isinstance(module, Driving) else {}
+        plants = module.plants
         found += [RackDrive(module, module.slot, item, plant, None if item else loop) for item, plant in plants.items()]
         if loop is not None and "" not in plants:
             found.append(RackDrive(module, module.slot, program=loop))
     found += [RackDrive(None, slot, program=loop) for slot, loop in loops.items()]
     return sorted(found, key=lambda drive: (drive.slot, drive.letter))
-
-
-def _slot_of(program: Program) -> int | None:
-    slot = program.cml.facts.get(SLOT.lower()) if program.cml is not None else None
-    return slot if isinstance(slot, int) else None
 
 
 def given_inputs(
@@ -118,7 +107,11 @@ def given_inputs(
     if call is None or drive.program is None:
         ratio = drive.plant.motor_overload_ratio if drive.plant is not None else None
         return {} if ratio is None else {"LIM_BAR": Given(ratio, f"{ratio} (motor_overload_ratio)")}
-    assigned = _assigned(drive.program, programs)
+    assigned: dict[str, Value | None] = {}
+    for program in programs:
+        for name, value in written_constants(program, Scope.COMMON).items():
+            assigned[name] = None if name in assigned else value
+    assigned |= written_constants(drive.program, Scope.LOCAL)
     given = {name: _given(value, source_text(value), "default") for name, value in call.defaults.items()}
     for item in call.block.inputs:
         expression = call.arguments.get(item.name)
@@ -173,34 +166,20 @@ def _present(
     return None, ""
 
 
-def _assigned(own: Program, programs: Iterable[Program]) -> dict[str, Value | None]:
-    """Return the constants that tasks assign to commons and one task to its locals; None for any other value."""
-    found: dict[str, Value | None] = {}
-    for program in programs:
-        for name, value in written_constants(program, Scope.COMMON).items():
-            found[name] = None if name in found else value
-    return found | written_constants(own, Scope.LOCAL)
-
-
 def written_constants(program: Program, scope: Scope, start: int | None = None) -> dict[str, Value | None]:
     """Return the variables that a task writes, with the value of those that get one constant in one place.
 
     ``start`` is a variable's value before, for functions such as BIT_SET% of the variable itself; None: not known.
     """
-    constants = _constants(program, start)
+    constants: dict[str, list[Value | None]] = {}
+    for statement, _ in statements_in_order((*program.startup, *program.scan)):
+        if isinstance(statement, Assignment):
+            name = print_expression(statement.target)
+            constants.setdefault(name, []).append(_value(statement.value, name, start))
     return {
         name: constants[name][0] if len(places) == 1 and name in constants else None
         for name, places in places_that_write(program, scope).items()
     }
-
-
-def _constants(program: Program, start: int | None) -> dict[str, list[Value | None]]:
-    found: dict[str, list[Value | None]] = {}
-    for statement, _ in statements_in_order((*program.startup, *program.scan)):
-        if isinstance(statement, Assignment):
-            name = print_expression(statement.target)
-            found.setdefault(name, []).append(_value(statement.value, name, start))
-    return found
 
 
 def _value(expression: Expression, name: str, start: int | None) -> Value | None:
@@ -218,12 +197,6 @@ def _value(expression: Expression, name: str, start: int | None) -> Value | None
         assert isinstance(result, tuple)
         result = result[0]
     return result if isinstance(result, (bool, int, float, str)) else None
-
-
-@runtime_checkable
-class _WiredToDrive(Protocol):
-    drive: int | None
-    """The slot of the 57C406 whose armature voltage it shows."""
 
 
 def drive_cases(
@@ -257,7 +230,7 @@ def _case(
         phase_step=registers.given(PHASE_STEP),
         period_step=registers.given(PERIOD_STEP),
         fast_change=registers.bit_0(OPTIONS),
-        voltage=any(_is_wired(module, drive.slot) for module in config.modules),
+        voltage=any(module.drive == drive.slot for module in config.modules),
         registers=not drive.letter,
         computing=_computing(drive, config),
     )
@@ -272,10 +245,6 @@ def _computing(drive: RackDrive, config: RackConfig) -> Computing | None:
     slowest = max(times_us, key=lambda item: times_us[item])
     modeled, sixth_us = config.execution is Timing.MODELED, program.period_ns / NS_PER_US
     return Computing(modeled, model, times_us[model], slowest, times_us[slowest], sixth_us)
-
-
-def _is_wired(module: object, slot: int) -> bool:
-    return isinstance(module, _WiredToDrive) and module.drive == slot
 
 
 @dataclass(frozen=True)

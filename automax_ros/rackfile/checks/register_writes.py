@@ -32,20 +32,19 @@ def constant_writes(config: RackConfig, programs: Iterable[Program]) -> Constant
         for variable in config.declared
         if variable.point is not None
     }
-    found: dict[Register, list[int | None]] = defaultdict(list)
-    for program in programs:
-        for statement, _ in statements_in_order((*program.startup, *program.scan)):
-            for register, value in (*_by_name(statement, places), *_by_number(statement)):
-                found[register].append(value)
-    return found
+    return _writes(programs, places)
 
 
 def numbered_writes(programs: Iterable[Program]) -> Constants:
     """Return the writes of IOWRITE statements alone to registers that they name by constants."""
+    return _writes(programs, {})
+
+
+def _writes(programs: Iterable[Program], places: Mapping[str, Register]) -> Constants:
     found: dict[Register, list[int | None]] = defaultdict(list)
     for program in programs:
         for statement, _ in statements_in_order((*program.startup, *program.scan)):
-            for register, value in _by_number(statement):
+            for register, value in (*_by_name(statement, places), *_by_number(statement)):
                 found[register].append(value)
     return found
 

@@ -97,20 +97,20 @@ class _Udc:
     def boolean_pairs(self) -> Iterator[_Found]:
         """If the UDC writes a boolean, all of an even pair of application registers are its outputs."""
         outputs = {item.variable.name for item in self.written}
-        told: set[int] = set()
+        reported: set[int] = set()
         for item in self.written:
             place = item.variable.point
             assert place is not None
             pair = place.register & ~1
-            if item.variable.type is not DataType.BOOLEAN or place.register not in APPLICATION or pair in told:
+            if item.variable.type is not DataType.BOOLEAN or place.register not in APPLICATION or pair in reported:
                 continue
             others = [
                 other
                 for other in self.points.values()
-                if other.name not in outputs and pair in map(_pair, _taken(other))
+                if other.name not in outputs and pair in (register & ~1 for register in _taken(other))
             ]
             if others:
-                told.add(pair)
+                reported.add(pair)
                 names = ", ".join(f"{other.name} (line {other.line})" for other in others[:4])
                 message = f"writing {item.variable.name} writes the registers {pair} and {pair + 1} whole, with {names}"
                 hint = "the UDC writes booleans 32 bits at a time: keep its inputs in other even pairs of registers"
@@ -128,7 +128,7 @@ class _Udc:
                 continue
             for item in self._written_by(program):
                 other = next((taken[bit] for bit in _bits(item.variable) if bit in taken), None)
-                if other is not None and _is_application(other.variable):
+                if other is not None and _taken(other.variable)[0] in APPLICATION:
                     message = (
                         f"{item.variable.name} is written here, {other.variable.name} by the UDC's task {other.task}"
                     )
@@ -212,12 +212,3 @@ def _bits(variable: CommonVariable) -> Iterable[tuple[int, int]]:
     assert variable.point is not None
     bits = range(16) if variable.point.bit is None else (variable.point.bit,)
     return [(register, bit) for register in _taken(variable) for bit in bits]
-
-
-def _pair(register: int) -> int:
-    return register & ~1
-
-
-def _is_application(variable: CommonVariable) -> bool:
-    assert variable.point is not None
-    return variable.point.register in APPLICATION

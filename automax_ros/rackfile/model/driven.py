@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.plants import PlantConfig
-
-
-@runtime_checkable
-class Driving(Protocol):
-    """A module with drives: ``plants`` are by drive, ``A`` and ``B`` of a UDC, "" where the module has only one."""
-
-    @property
-    def plants(self) -> Mapping[str, PlantConfig]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -34,8 +24,9 @@ class DrivenPlant:
 
 def driven_plants(config: RackConfig) -> tuple[DrivenPlant, ...]:
     """Return the simulated plants that drives turn, in the order of slots and drives."""
-    driving = (module for module in config.modules if isinstance(module, Driving))
     found = (
-        DrivenPlant(plant, module.slot, drive) for module in driving for drive, plant in sorted(module.plants.items())
+        DrivenPlant(plant, module.slot, drive)
+        for module in config.modules
+        for drive, plant in sorted(module.plants.items())
     )
     return tuple(item for item in found if item.config.motor is not None)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 from automax_ros.compile.base.cost import CostModel, Model
+from automax_ros.rackfile.model.plants import PlantConfig
 
 MIN_PRIORITY, MAX_PRIORITY = 4, 11
 """Priorities of tasks: 4 is served first (J2-3106-1 p. 8-2)."""
@@ -103,49 +103,30 @@ class Registers:
 NO_REGISTERS = Registers()
 
 
-class ModuleConfig(Protocol):
-    """A module as a rack file configures it. Its kind (``rack/modules``) has the rest.
+@dataclass(frozen=True, kw_only=True)
+class ModuleConfig:
+    """A module as a rack file configures it; its kind (``rack/modules``) has the rest.
 
     ``name`` is unique in the rack and that of its node; ``tick_ns`` is that of its tasks, 0 if it can have none;
-    ``common_registers`` is how many 16-bit registers of common variables it can hold, 0 for none.
+    ``common_registers`` is how many 16-bit registers of common variables it can hold, 0 for none. ``keeps_locals``:
+    STOP ALL and a loss of power leave the locals of its tasks (2.4.5). ``times`` is the model whose execution times its
+    tasks have. ``plants`` are those that its drives turn, by drive: ``A`` and ``B`` of a UDC, "" where the module has
+    only one. ``drive`` is the slot of the 57C406 whose armature voltage is wired to it.
     """
 
-    @property
-    def slot(self) -> int: ...  # noqa: D102
-
-    @property
-    def model(self) -> str: ...  # noqa: D102
-
-    @property
-    def line(self) -> int: ...  # noqa: D102
-
-    @property
-    def name(self) -> str: ...  # noqa: D102
-
-    @property
-    def tick_ns(self) -> int: ...  # noqa: D102
-
-    @property
-    def tasks(self) -> tuple[TaskConfig, ...]: ...  # noqa: D102
-
-    @property
-    def registers(self) -> Registers: ...  # noqa: D102
-
-    @property
-    def common_registers(self) -> int: ...  # noqa: D102
-
-    @property
-    def has_battery(self) -> bool: ...  # noqa: D102
-
-    @property
-    def keeps_locals(self) -> bool:
-        """Whether its tasks keep their locals at STOP ALL and without power (2.4.5)."""
-        ...
-
-    @property
-    def times(self) -> Model:
-        """The model whose execution times its tasks have, Model.NONE for a module without tasks."""
-        ...
+    slot: int
+    model: str
+    name: str
+    line: int = 0
+    tick_ns: int = 0
+    tasks: tuple[TaskConfig, ...] = ()
+    registers: Registers = NO_REGISTERS
+    common_registers: int = 0
+    has_battery: bool = False
+    keeps_locals: bool = True
+    times: Model = Model.NONE
+    plants: Mapping[str, PlantConfig] = field(default_factory=dict)
+    drive: int | None = None
 
 
 def cost_model(module: ModuleConfig) -> CostModel:

@@ -29,14 +29,9 @@ def plant_name(text: str) -> Schema:
 
 @dataclass(frozen=True)
 class SupplyConfig:
-    """The AC line of a plant; None is the usual value for its motor.
+    """The AC line of a plant, in the units of the keys; None is the usual value for its motor.
 
-    Attributes:
-        v_ll: line-to-line voltage, V rms.
-        hz: frequency, Hz.
-        ls_mh: source inductance of a phase, mH.
-        rs_mohm: source resistance of a phase, milliohm.
-        standard: whether the phases pass in the standard order C, B, A (52.1.5).
+    ``standard``: the phases pass in the standard order C, B, A (52.1.5).
     """
 
     v_ll: float | None = None
@@ -50,12 +45,9 @@ class SupplyConfig:
 class LoadConfig:
     """The load of a plant's motor.
 
-    Attributes:
-        torque_nm: a torque that keeps its direction at any speed, N m; positive brakes positive speed.
-        torque_per_rpm: pairs of rpm and N m, rpm ascending; () for none.
-        friction_nm: Coulomb friction, N m.
-        speed_rpm: the speed at which the shaft is held, 0 for a locked rotor; None for a shaft that turns.
-        from_ros: whether ROS 2 may set ``torque_nm``.
+    ``torque_nm`` keeps its direction at any speed, positive brakes positive speed. ``torque_per_rpm`` are pairs of rpm
+    (ascending) and N m; ``friction_nm`` is Coulomb friction; ``speed_rpm`` the speed at which the shaft is held, 0 for
+    a locked rotor, None for a shaft that turns; ``from_ros`` whether ROS 2 may set ``torque_nm``.
     """
 
     torque_nm: float = 0.0
@@ -76,19 +68,12 @@ class CoupleConfig:
 
 @dataclass(frozen=True)
 class PlantConfig:
-    """A plant.
+    """A plant; ``line`` is the line of the file.
 
-    Attributes:
-        name: its name.
-        motor: a name of ``MOTORS`` or a plate; None for a plant of which only the drive's parameters are known, which
-            is not simulated.
-        motor_overload_ratio: that of its drive, %.
-        line: the line of the file.
-        supply: the AC line.
-        load: the load of the motor.
-        inertia: inertia of motor and load over the motor's own.
-        couple: the coupling of its shaft; None for none, or if the section of the other plant has it.
-        joint: the name of its shaft on ROS; "" if that is the plant's name.
+    ``motor`` is a name of ``MOTORS`` or a plate; None for a plant of which only the drive's parameters are known, which
+    is not simulated. ``motor_overload_ratio`` is in %, ``inertia`` that of motor and load over the motor's own.
+    ``couple`` is None for no coupling, or if the section of the other plant has it; ``joint`` the name of its shaft on
+    ROS, "" if that is the plant's name.
     """
 
     name: str
@@ -122,15 +107,9 @@ class PlantConfig:
 
 @dataclass(frozen=True)
 class JointCommand:
-    """A common that commands of ros2_control write.
+    """A common that commands of ros2_control write, ``velocity`` or ``effort`` of a joint.
 
-    Attributes:
-        plant: the plant's name.
-        joint: the name of its joint.
-        interface: ``velocity`` or ``effort``.
-        common: the variable's full name.
-        scale: converts the counts of an INTEGER to rpm or N m; None for a REAL, whose value is in these units.
-        line: the line of the file.
+    ``scale`` converts the counts of an INTEGER to rpm or N m; None for a REAL, whose value is in these units.
     """
 
     plant: str
@@ -143,16 +122,9 @@ class JointCommand:
 
 @dataclass(frozen=True)
 class FeedConfig:
-    """A signal of a plant that an instrument brings into a common.
+    """A signal of a plant (``drive/plant/signals.SIGNALS``) that an instrument brings into an element of a common.
 
-    Attributes:
-        plant: the plant's name.
-        common: the variable's full name.
-        element: the index of the element that is written.
-        signal: a name of ``drive/plant/signals.SIGNALS``.
-        every_ns: time between two samples, ns.
-        scale: converts the signal to the counts of an INTEGER; None for a REAL, which has the signal itself.
-        line: the line of the file.
+    ``scale`` converts the signal to the counts of an INTEGER; None for a REAL, which has the signal itself.
     """
 
     plant: str

@@ -44,7 +44,12 @@ def topic_names(names: Iterable[str]) -> dict[str, str]:
     """
     every = list(names)
     shared = Counter(bare_name(name) for name in every)
-    return {name: f"common/{_word(name, shared[bare_name(name)] > 1)}" for name in every}
+    found = {}
+    for name in every:
+        bare = bare_name(name)
+        visible = f"u{bare}" if bare.startswith("_") else bare
+        found[name] = f"common/{visible}_{TYPE_WORDS[type_of_name(name)]}" if shared[bare] > 1 else f"common/{visible}"
+    return found
 
 
 def set_topic(topic: str) -> str:
@@ -78,9 +83,3 @@ def network_topic(namespace: str, network: str) -> str:
     """
     outside = namespace.rpartition("/")[0]
     return f"/{outside}/dcsnet/{network}" if outside else f"/dcsnet/{network}"
-
-
-def _word(name: str, shared: bool) -> str:
-    bare = bare_name(name)
-    visible = f"u{bare}" if bare.startswith("_") else bare
-    return f"{visible}_{TYPE_WORDS[type_of_name(name)]}" if shared else visible

@@ -7,13 +7,10 @@ clear them, as volatile common memory (decision). They do not arbitrate the bus.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from types import MappingProxyType
 
-from automax_ros.compile.base.cost import Model
-from automax_ros.core.json_schema import Keys
-from automax_ros.rackfile.model.module import NO_REGISTERS, Registers, TaskConfig
-from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
+from automax_ros.rackfile.model.module import NO_REGISTERS, ModuleConfig, Registers
+from automax_ros.rackfile.modules.kind import ModuleKind, ModuleSection, RackLayout
 
 COMMON_REGISTERS = {"57C413": 65536, "57C423": 131072}
 """16-bit registers for common variables in slot 0 (J-3636 p. 1-1)."""
@@ -22,50 +19,24 @@ _USER_REGISTERS = Registers(65536, either=range(65536))
 """Registers of a module in an even slot other than 0 (J-3636 p. 1-1)."""
 
 
-@dataclass(frozen=True)
-class CommonMemoryConfig:
-    """A common memory module."""
-
-    slot: int
-    model: str
-    line: int = 0
-
-    tick_ns = 0
-    times = Model.NONE
-    has_battery = True
-    keeps_locals = True
-
-    @property
-    def name(self) -> str:
-        """The module's name in the rack; in slot 0 it is that of the node of all common variables."""
-        return f"{NODE}_{self.slot}" if self.slot else NODE
-
-    @property
-    def tasks(self) -> tuple[TaskConfig, ...]:
-        """No tasks: they are never stored here (J2-3106-1 p. 10-2)."""
-        return ()
-
-    @property
-    def registers(self) -> Registers:
-        """Registers of user data, none in slot 0."""
-        return _USER_REGISTERS if self.slot else NO_REGISTERS
-
-    @property
-    def common_registers(self) -> int:
-        """16-bit registers for common variables, only in slot 0."""
-        return 0 if self.slot else COMMON_REGISTERS[self.model]
+class CommonMemoryConfig(ModuleConfig):
+    """A common memory module; in slot 0 its name is that of the node of all common variables."""
 
 
-class CommonMemoryKind:
+class CommonMemoryKind(ModuleKind):
     """The options of a common memory module in a rack file."""
 
     word = "common memory"
-    models = dict.fromkeys(COMMON_REGISTERS, "common memory module")
-    options: Keys = MappingProxyType({})
+    models = MappingProxyType(dict.fromkeys(COMMON_REGISTERS, "common memory module"))
 
     def read(self, found: ModuleSection) -> CommonMemoryConfig:
         """Read the section, which has no keys of its own."""
-        return CommonMemoryConfig(found.slot, found.model, found.span.line)
+        return CommonMemoryConfig(
+            **{**found.placed(NODE), **({} if found.slot else {"name": NODE})},
+            registers=_USER_REGISTERS if found.slot else NO_REGISTERS,
+            common_registers=0 if found.slot else COMMON_REGISTERS[found.model],
+            has_battery=True,
+        )
 
     def check_places(self, rack: RackLayout) -> None:
         """Report common memory in an odd slot (J-3636 p. 1-1)."""

@@ -9,23 +9,15 @@ the plant's line (decision). Register 0 shows the signal, 4095 counts at 10 V, c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.core.json_schema import Keys
 from automax_ros.rackfile.model.config import MAX_SLOT
-from automax_ros.rackfile.model.module import Registers
-from automax_ros.rackfile.model.plants import plant_name
-from automax_ros.rackfile.modules.io import IoModel, WithoutTasks
-from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
+from automax_ros.rackfile.model.module import ModuleConfig, Registers
+from automax_ros.rackfile.model.plants import PlantConfig, plant_name
+from automax_ros.rackfile.modules.kind import ModuleKind, ModuleSection, RackLayout
 from automax_ros.rackfile.reading.values import schemas, whole_key
-
-if TYPE_CHECKING:
-    from automax_ros.rackfile.model.plants import PlantConfig
-
 
 TACH_THRESHOLD, PHASE_STEP, PERIOD_STEP, OPTIONS = 4136, 4137, 4138, 4146
 """The registers that an application may write (52.7)."""
@@ -46,35 +38,22 @@ _ANALOG_REGISTERS = Registers(4, by_itself=True)
 _DRIVE = whole_key("drive", "Slot of the 57C406 whose armature voltage is wired to it.", 0, MAX_SLOT, "AMX6520")
 
 
-@dataclass(frozen=True)
-class DriveConfig(WithoutTasks):
+class DriveConfig(ModuleConfig):
     """A 57C406; without a ``plant`` it has registers and switches only, and its loop measures no line."""
 
-    slot: int
-    model: str
-    plant: PlantConfig | None = None
-    line: int = 0
-
-    registers: Registers = _REGISTERS
-
     @property
-    def name(self) -> str:
-        """The module's name in the rack and of its node."""
-        return f"drive_{self.slot}"
-
-    @property
-    def plants(self) -> Mapping[str, PlantConfig]:
+    def plant(self) -> PlantConfig | None:
         """The plant of its one drive."""
-        return {} if self.plant is None else {"": self.plant}
+        return self.plants.get("")
 
 
-class DriveControllerKind:
+class DriveControllerKind(ModuleKind):
     """The options of a 57C406 in a rack file."""
 
     word = "drive I/O controller"
-    table: Mapping[str, IoModel] = MappingProxyType({"57C406": IoModel("drive I/O controller module", _REGISTERS)})
-    models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
-    options: Keys = MappingProxyType({"plant": plant_name("The plant that the module drives.")})
+    models = MappingProxyType({"57C406": "drive I/O controller module"})
+    table = MappingProxyType({"57C406": _REGISTERS})
+    options = MappingProxyType({"plant": plant_name("The plant that the module drives.")})
 
     def read(self, found: ModuleSection) -> DriveConfig:
         """Read the plant."""
@@ -83,45 +62,34 @@ class DriveControllerKind:
         plant = None if node is None else found.plants.claim(node, what)
         if node is not None and plant is not None and plant.motor is None and not found.findings.errors:
             found.findings.add("AMX6522", f"{what}: the plant {plant.name} has no motor", node.span)
-        return DriveConfig(found.slot, found.model, plant, found.span.line)
-
-    def check_places(self, rack: RackLayout) -> None:
-        """Report nothing: no source names a slot where a 57C406 may not be."""
+        plants = {} if plant is None else {"": plant}
+        return DriveConfig(**found.placed("drive"), registers=_REGISTERS, plants=plants)
 
 
 DRIVE_CONTROLLER = DriveControllerKind()
 
 
-@dataclass(frozen=True)
-class DriveAnalogConfig(WithoutTasks):
-    """A 57C405; ``drive`` is the slot of the 57C406 to whose armature it is wired."""
+@dataclass(frozen=True, kw_only=True)
+class DriveAnalogConfig(ModuleConfig):
+    """A 57C405; ``drive_span`` is the place of its key ``drive``."""
 
-    slot: int
-    model: str
-    drive: int | None = None
-    line: int = 0
     drive_span: Span | None = field(default=None, compare=False)
 
-    registers: Registers = _ANALOG_REGISTERS
 
-    @property
-    def name(self) -> str:
-        """The module's name in the rack and of its node."""
-        return f"drive_analog_{self.slot}"
-
-
-class DriveAnalogKind:
+class DriveAnalogKind(ModuleKind):
     """The options of a 57C405 in a rack file."""
 
     word = "drive analog I/O"
-    table: Mapping[str, IoModel] = MappingProxyType({"57C405": IoModel("drive analog I/O module", _ANALOG_REGISTERS)})
-    models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
-    options: Keys = MappingProxyType(schemas(_DRIVE))
+    models = MappingProxyType({"57C405": "drive analog I/O module"})
+    table = MappingProxyType({"57C405": _ANALOG_REGISTERS})
+    options = MappingProxyType(schemas(_DRIVE))
 
     def read(self, found: ModuleSection) -> DriveAnalogConfig:
         """Read the drive to which it is wired."""
         node, drive = found.section.get("drive"), found.section.read(_DRIVE)
-        return DriveAnalogConfig(found.slot, found.model, drive, found.span.line, node.span if node else None)
+        span = node.span if node is not None else None
+        place = found.placed("drive_analog")
+        return DriveAnalogConfig(**place, registers=_ANALOG_REGISTERS, drive=drive, drive_span=span)
 
     def check_places(self, rack: RackLayout) -> None:
         """Report a drive that does not exist, and one that has two of these modules."""

@@ -31,14 +31,9 @@ of register 3: it can be set and does nothing (decision).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import Protocol, runtime_checkable
 
-from automax_ros.compile.base.cost import Model
-from automax_ros.core.json_schema import Keys
-from automax_ros.rackfile.model.module import Interrupt, Registers, TaskConfig
-from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
+from automax_ros.rackfile.model.module import Interrupt, ModuleConfig, Registers
+from automax_ros.rackfile.modules.kind import ModuleKind, ModuleSection
 
 DRIVE_MODEL = "57C408"
 """The drive digital I/O module."""
@@ -74,99 +69,43 @@ _COUNTER_REGISTERS = Registers(
 )
 
 
-class WithoutTasks:
-    """The common part of the configurations of modules that run no tasks and hold no common variables."""
-
-    tick_ns = 0
-    times = Model.NONE
-    has_battery = False
-    keeps_locals = True
-    common_registers = 0
-
-    @property
-    def tasks(self) -> tuple[TaskConfig, ...]:
-        """No tasks."""
-        return ()
+class IoConfig(ModuleConfig):
+    """An I/O module in any slot."""
 
 
-@dataclass(frozen=True)
-class IoConfig(WithoutTasks):
-    """An I/O module in any slot; its name begins with ``node``."""
+class IoKind(ModuleKind):
+    """A kind of module for which a rack file gives only number and slot; its modules' names begin with ``node``.
 
-    slot: int
-    model: str
-    node: str
-    registers: Registers
-    line: int = 0
+    ``modules`` are the titles and registers of its catalogue numbers.
+    """
 
-    @property
-    def name(self) -> str:
-        """The module's name in the rack and of its node."""
-        return f"{self.node}_{self.slot}"
-
-
-@dataclass(frozen=True)
-class IoModel:
-    """One catalogue number: the module's title and its registers."""
-
-    title: str
-    registers: Registers
-
-
-@runtime_checkable
-class HasTable(Protocol):
-    """A kind of module whose catalogue numbers each have registers of their own."""
-
-    @property
-    def table(self) -> Mapping[str, IoModel]: ...  # noqa: D102
-
-
-@dataclass(frozen=True, eq=False)
-class IoKind:
-    """A kind of module for which a rack file gives only the number and the slot."""
-
-    word: str
-    node: str
-    table: Mapping[str, IoModel]
-    models: Mapping[str, str] = field(init=False)
-    options: Keys = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Derive the attributes that the other kinds define themselves."""
-        titles = {number: model.title for number, model in self.table.items()}
-        object.__setattr__(self, "models", MappingProxyType(titles))
+    def __init__(self, word: str, node: str, modules: Mapping[str, tuple[str, Registers]]) -> None:
+        self.word, self.node = word, node
+        self.models = {number: title for number, (title, _) in modules.items()}
+        self.table = {number: registers for number, (_, registers) in modules.items()}
 
     def read(self, found: ModuleSection) -> IoConfig:
         """Read the section, which has no keys of its own."""
-        return IoConfig(found.slot, found.model, self.node, self.table[found.model].registers, found.span.line)
-
-    def check_places(self, rack: RackLayout) -> None:
-        """Report nothing: no source names a slot where these modules may not be."""
+        return IoConfig(**found.placed(self.node), registers=self.table[found.model])
 
 
 DIGITAL_IO = IoKind(
     "digital I/O",
     "digital_io",
     {
-        "57C402": IoModel("digital output module", _OUTPUTS),
-        "57C403": IoModel("digital output module", _OUTPUTS),
-        DRIVE_MODEL: IoModel("drive digital I/O module", _DRIVE),
-        "57C419": IoModel("32-channel digital input module", _INPUTS),
+        "57C402": ("digital output module", _OUTPUTS),
+        "57C403": ("digital output module", _OUTPUTS),
+        DRIVE_MODEL: ("drive digital I/O module", _DRIVE),
+        "57C419": ("32-channel digital input module", _INPUTS),
     },
 )
-
-
 ANALOG_IO = IoKind(
     "analog I/O",
     "analog_io",
     {
-        "57C409": IoModel("2-channel analog input module", _ANALOG_INPUTS),
-        "57C410": IoModel("analog output module", Registers(4, outputs=range(4))),
+        "57C409": ("2-channel analog input module", _ANALOG_INPUTS),
+        "57C410": ("analog output module", Registers(4, outputs=range(4))),
     },
 )
-
-
-RESOLVER = IoKind("resolver input", "resolver", {"57C411": IoModel("resolver input module", _RESOLVER_REGISTERS)})
-
-
-PULSETACH = IoKind("pulsetach input", "pulsetach", {"57C421": IoModel("pulsetach input module", _COUNTER_REGISTERS)})
+RESOLVER = IoKind("resolver input", "resolver", {"57C411": ("resolver input module", _RESOLVER_REGISTERS)})
+PULSETACH = IoKind("pulsetach input", "pulsetach", {"57C421": ("pulsetach input module", _COUNTER_REGISTERS)})

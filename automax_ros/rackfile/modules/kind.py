@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from types import MappingProxyType
+from typing import Any
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.json_schema import Keys
-from automax_ros.rackfile.model.module import ModuleConfig, TaskConfig
+from automax_ros.rackfile.model.module import ModuleConfig, Registers, TaskConfig
 from automax_ros.rackfile.reading.values import ProblemList, Section
 from automax_ros.rackfile.sections.plants import Plants
 from automax_ros.rackfile.sections.tasks import PRIORITIES, TaskPlaces, TaskReader
@@ -36,6 +37,10 @@ class ModuleSection:
         """The problems of the file."""
         return self.section.findings
 
+    def placed(self, node: str) -> Any:
+        """Return slot, model, name and line, as keywords for the module's configuration; ``node`` begins its name."""
+        return {"slot": self.slot, "model": self.model, "name": f"{node}_{self.slot}", "line": self.span.line}
+
     def read_tasks(self, places: TaskPlaces = PRIORITIES) -> tuple[TaskConfig, ...]:
         """Return the module's tasks without errors."""
         node = self.section.get("tasks")
@@ -59,7 +64,7 @@ class RackLayout:
     ``modules`` are the configurations of those that could be read, in the order of slots.
     """
 
-    standing: Sequence[PlacedModule]
+    placed: Sequence[PlacedModule]
     complete: bool
     span: Span
     findings: ProblemList
@@ -67,30 +72,25 @@ class RackLayout:
 
     def of(self, kind: ModuleKind) -> list[PlacedModule]:
         """Return the modules of one kind, in the order of slots."""
-        return sorted((item for item in self.standing if item.kind is kind), key=lambda item: item.slot)
+        return sorted((item for item in self.placed if item.kind is kind), key=lambda item: item.slot)
 
 
-class ModuleKind(Protocol):
+class ModuleKind:
     """A kind of module: its options in a rack file, and its allowed slots.
 
-    ``word`` names the kind in messages; ``models`` are its catalogue numbers, each with its title.
+    ``word`` names the kind in messages; ``models`` are its catalogue numbers, each with its title; ``options`` the keys
+    of its section with the schemas of their values, without ``module``. ``table`` has the registers of each number, for
+    modules whose registers depend on nothing else.
     """
 
-    @property
-    def word(self) -> str: ...  # noqa: D102
-
-    @property
-    def models(self) -> Mapping[str, str]: ...  # noqa: D102
-
-    @property
-    def options(self) -> Keys:
-        """The keys of its section with the schemas of their values, without ``module``."""
-        ...
+    word: str
+    models: Mapping[str, str]
+    options: Keys = MappingProxyType({})
+    table: Mapping[str, Registers] = MappingProxyType({})
 
     def read(self, found: ModuleSection) -> ModuleConfig | None:
         """Read a module's section; report errors in the findings, and return None if no configuration results."""
-        ...
+        raise NotImplementedError
 
     def check_places(self, rack: RackLayout) -> None:
-        """Report modules of this kind in slots where they may not be, or that are missing."""
-        ...
+        """Report modules of this kind in slots where they may not be, or that are missing; most may be anywhere."""

@@ -17,18 +17,15 @@ part of a 57C570 is ours (decision); the manual of the 57C445 says the same of i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from types import MappingProxyType
 
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.core.json_schema import Keys, named
+from automax_ros.core.json_schema import named
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Node
-from automax_ros.rackfile.model.module import Registers
-from automax_ros.rackfile.modules.io import WithoutTasks
-from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
+from automax_ros.rackfile.model.module import ModuleConfig, Registers
+from automax_ros.rackfile.modules.kind import ModuleKind, ModuleSection, RackLayout
 from automax_ros.rackfile.reading.names import RACK_NAME, is_rack_name
 from automax_ros.rackfile.reading.values import Key, ProblemList, integer_value, schemas, text_value, whole_key
 
@@ -97,27 +94,14 @@ def registers_of(drop: int, depth: int) -> Registers:
     )
 
 
-@dataclass(frozen=True)
-class NetworkConfig(WithoutTasks):
+@dataclass(frozen=True, kw_only=True)
+class NetworkConfig(ModuleConfig):
     """A 57C404: the ``network`` whose cable it is on, its ``drop``, and ``depth``, the drops with variables."""
 
-    slot: int
-    model: str
     network: str
     drop: int
     depth: int = 1
-    line: int = 0
     span: Span | None = field(default=None, compare=False)
-
-    @property
-    def name(self) -> str:
-        """The module's name in the rack and of its node."""
-        return f"network_{self.slot}"
-
-    @cached_property
-    def registers(self) -> Registers:
-        """The registers of a module at its drop."""
-        return registers_of(self.drop, self.depth)
 
     @property
     def drops(self) -> range:
@@ -140,12 +124,12 @@ _DROP = whole_key("drop", "Its place on the network; 0 is the master.", MASTER, 
 _DEPTH = whole_key("depth", "On how many drops, from its own on, its variables may stand.", 1, LAST_DROP, "AMX6561", 1)
 
 
-class NetworkKind:
+class NetworkKind(ModuleKind):
     """The options of a 57C404 in a rack file."""
 
     word = "network module"
-    models: Mapping[str, str] = MappingProxyType({"57C404": "DCS-NET network communications module"})
-    options: Keys = MappingProxyType(schemas(_NETWORK, _DROP, _DEPTH))
+    models = MappingProxyType({"57C404": "DCS-NET network communications module"})
+    options = MappingProxyType(schemas(_NETWORK, _DROP, _DEPTH))
 
     def read(self, found: ModuleSection) -> NetworkConfig | None:
         """Read network, drop and depth."""
@@ -167,7 +151,14 @@ class NetworkKind:
             depth = integer_value(node, what, found.findings, low=1, high=high, code="AMX6561")
         if depth is None:
             return None
-        return NetworkConfig(found.slot, found.model, network, drop, depth, found.span.line, place.span)
+        return NetworkConfig(
+            **found.placed("network"),
+            registers=registers_of(drop, depth),
+            network=network,
+            drop=drop,
+            depth=depth,
+            span=place.span,
+        )
 
     def check_places(self, rack: RackLayout) -> None:
         """Report two modules of the rack that represent one drop of a network (57C570 manual p. 18-7)."""

@@ -10,16 +10,15 @@ and current minor loops (J-3675 p. 6-17). Its times are those of table 6.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from types import MappingProxyType
 
 from automax_ros.compile.base.cost import Model
-from automax_ros.core.json_schema import Keys, steps
+from automax_ros.core.json_schema import steps
 from automax_ros.core.ticks import DEFAULT_TICK_NS, MAX_TICK_NS, MIN_TICK_NS, NS_PER_MS, TICK_STEP_NS, tick_ns
 from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.rackfile.model.module import NO_REGISTERS, Registers, TaskConfig
+from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.common_memory import COMMON_MEMORY
-from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
+from automax_ros.rackfile.modules.kind import ModuleKind, ModuleSection, RackLayout
 from automax_ros.rackfile.reading.executive import OLDEST, tick_fault, version_text
 from automax_ros.rackfile.reading.values import Key, ProblemList, schemas, wrong_kind
 from automax_ros.rackfile.sections.tasks import PRIORITIES, tasks_schema
@@ -53,38 +52,20 @@ def _tick(node: Node, what: str, findings: ProblemList) -> int | None:
 _TICK_MS = Key("tick_ms", steps("Tick rate in ms; the scan time of a task is its TICKS times this.", *_TICKS_MS), _tick)
 
 
-@dataclass(frozen=True)
-class ProcessorConfig:
+class ProcessorConfig(ModuleConfig):
     """A Processor module; ``model`` is its number as the manuals write it (``57C430A``), tasks in the file's order."""
 
-    slot: int
-    model: str
-    tick_ns: int
-    tasks: tuple[TaskConfig, ...] = ()
-    line: int = 0
 
-    has_battery = True
-    keeps_locals = True
-    registers: Registers = NO_REGISTERS
-    common_registers = _COMMON_REGISTERS
-
-    @property
-    def name(self) -> str:
-        """The module's name in the rack and of its node."""
-        return f"processor_{self.slot}"
-
-    @property
-    def times(self) -> Model:
-        """The model whose execution times its tasks have."""
-        return Model(self.model)
+class Pc3000Config(ProcessorConfig):
+    """A PC3000 with its tasks."""
 
 
-class ProcessorKind:
+class ProcessorKind(ModuleKind):
     """The options of a Processor in a rack file."""
 
     word = "processor"
-    models = {"57C430A": "6010", "57C431": "6011", "57C435": "7010"}  # noqa: RUF012
-    options: Keys = MappingProxyType({**schemas(_TICK_MS), "tasks": tasks_schema(PRIORITIES)})
+    models = MappingProxyType({"57C430A": "6010", "57C431": "6011", "57C435": "7010"})
+    options = MappingProxyType({**schemas(_TICK_MS), "tasks": tasks_schema(PRIORITIES)})
 
     def read(self, found: ModuleSection) -> ProcessorConfig:
         """Read tick and tasks; the Executive may be too old for the module or for the tick."""
@@ -97,7 +78,14 @@ class ProcessorKind:
         fault = tick_fault(found.executive, tick) if tick is not None else None
         if fault is not None and node is not None:
             found.findings.add("AMX6702", f"{found.where}: {fault}", node.span)
-        return ProcessorConfig(found.slot, found.model, tick or DEFAULT_TICK_NS, found.read_tasks(), found.span.line)
+        return ProcessorConfig(
+            **found.placed("processor"),
+            tick_ns=tick or DEFAULT_TICK_NS,
+            tasks=found.read_tasks(),
+            common_registers=_COMMON_REGISTERS,
+            has_battery=True,
+            times=Model.PC3000 if self is PC3000 else Model(found.model),
+        )
 
     def check_places(self, rack: RackLayout) -> None:
         """Report too few or too many Processors, and those in slots other than 1 to 4, or 0 for a lone Processor."""
@@ -105,7 +93,7 @@ class ProcessorKind:
         if not rack.complete:
             return
         has_memory = any(item.slot == 0 for item in rack.of(COMMON_MEMORY))
-        if not any(isinstance(item.kind, ProcessorKind) for item in rack.standing):
+        if not any(isinstance(item.kind, ProcessorKind) for item in rack.placed):
             hint = f"Processors are {', '.join(self.models)}"
             rack.findings.add("AMX6209", "the rack has no Processor", rack.span, hint)
         elif len(own) > MAX_PROCESSORS:
@@ -127,31 +115,16 @@ class ProcessorKind:
 PROCESSOR = ProcessorKind()
 
 
-@dataclass(frozen=True)
-class Pc3000Config(ProcessorConfig):
-    """A PC3000 with its tasks."""
-
-    @property
-    def name(self) -> str:
-        """The module's name in the rack and of its node: there is only one."""
-        return NODE
-
-    @property
-    def times(self) -> Model:
-        """The model whose execution times its tasks have."""
-        return Model.PC3000
-
-
 class Pc3000Kind(ProcessorKind):
     """The options of a PC3000 in a rack file: those of a Processor."""
 
     word = "PC3000"
-    models = dict.fromkeys(("57C560", "57C570"), "PC3000")
+    models = MappingProxyType(dict.fromkeys(("57C560", "57C570"), "PC3000"))
 
     def read(self, found: ModuleSection) -> Pc3000Config:
-        """Read tick and tasks."""
+        """Read tick and tasks; the module's name is that of its node, since there is only one."""
         plain = super().read(found)
-        return Pc3000Config(plain.slot, plain.model, plain.tick_ns, plain.tasks, plain.line)
+        return Pc3000Config(**{**vars(plain), "name": NODE})
 
     def check_places(self, rack: RackLayout) -> None:
         """Report a PC3000 in a slot other than 0, and any module next to one."""
@@ -160,7 +133,7 @@ class Pc3000Kind(ProcessorKind):
             if item.slot != 0:
                 message = f"the PC3000 {item.model} stands in slot 0 of a rack of its own, not in slot {item.slot}"
                 rack.findings.add("AMX6773", message, item.span)
-        for item in rack.standing if own else ():
+        for item in rack.placed if own else ():
             if item is not own[0]:
                 message = f"the {item.model} in slot {item.slot} cannot stand next to a PC3000, which has no slots"
                 hint = "write a rack of its own for each of them"

@@ -11,13 +11,12 @@ The size of a task on a UDC is an estimate: no source gives the size of compiled
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from types import MappingProxyType
 
 from automax_ros.compile.base.cost import Model
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.core.json_schema import Keys, may_be_empty, section
+from automax_ros.core.json_schema import may_be_empty, section
 from automax_ros.core.ticks import UDC_TICK_NS
 from automax_ros.core.types import DataType
 from automax_ros.core.yaml_text import Node
@@ -25,9 +24,9 @@ from automax_ros.drive.pmi.registers import DRIVE_B, WRITTEN
 from automax_ros.language.program import Program, Symbol
 from automax_ros.language.tree.tree import Scope
 from automax_ros.language.tree.walk import arguments_of, expressions_of, parts, statements_in_order
-from automax_ros.rackfile.model.module import Interrupt, Registers, TaskConfig
+from automax_ros.rackfile.model.module import Interrupt, ModuleConfig, Registers
 from automax_ros.rackfile.model.plants import PlantConfig, plant_name
-from automax_ros.rackfile.modules.kind import ModuleSection, RackLayout
+from automax_ros.rackfile.modules.kind import ModuleKind, ModuleSection, RackLayout
 from automax_ros.rackfile.reading.values import Key, ProblemList, Section, choice_key, entries_of
 from automax_ros.rackfile.sections.tasks import TaskPlace, TaskPlaces, tasks_schema
 
@@ -113,33 +112,8 @@ def _variable_bytes(symbol: Symbol) -> int:
     return size * symbol.elements
 
 
-@dataclass(frozen=True)
-class UdcConfig:
-    """A UDC module. ``tasks`` are in the order of their drives; ``plants`` are by drive."""
-
-    slot: int
-    model: str
-    tasks: tuple[TaskConfig, ...] = ()
-    plants: Mapping[str, PlantConfig] = field(default_factory=dict)
-    line: int = 0
-
-    tick_ns = UDC_TICK_NS
-    times = Model.UDC
-    has_battery = False
-    keeps_locals = False
-    common_registers = 0
-
-    @property
-    def name(self) -> str:
-        """The module's name in the rack and of its node."""
-        return f"udc_{self.slot}"
-
-    @cached_property
-    def registers(self) -> Registers:
-        """Its registers: for a drive with a PMI the module itself writes feedback and communication status."""
-        bases = [DRIVE_B if drive == "B" else 0 for drive, plant in self.plants.items() if plant.motor is not None]
-        shown = frozenset(base + number for base in bases for number in WRITTEN)
-        return replace(UDC_REGISTERS, shown=shown) if shown else UDC_REGISTERS
+class UdcConfig(ModuleConfig):
+    """A UDC module, its tasks in the order of their drives."""
 
 
 def _drives() -> TaskPlaces:
@@ -160,15 +134,18 @@ def _drives() -> TaskPlaces:
     return TaskPlaces(Key("drive", _DRIVE.schema, read), "A", len(DRIVES))
 
 
-class UdcKind:
+class UdcKind(ModuleKind):
     """The options of a UDC in a rack file."""
 
     word = "UDC"
-    models = {"57552": "UDC module"}  # noqa: RUF012
-    options: Keys = MappingProxyType({"tasks": tasks_schema(_drives()), "plants": _PLANTS_SCHEMA})
+    models = MappingProxyType({"57552": "UDC module"})
+    options = MappingProxyType({"tasks": tasks_schema(_drives()), "plants": _PLANTS_SCHEMA})
 
     def read(self, found: ModuleSection) -> UdcConfig:
-        """Read tasks and plants; a task in a language that a UDC does not have is reported (J2-3106-1 p. 2-5)."""
+        """Read tasks and plants; a UDC does not have all languages of tasks (J2-3106-1 p. 2-5).
+
+        For a drive with a PMI the module itself writes feedback and communication status.
+        """
         tasks = found.read_tasks(_drives())
         for task in tasks:
             suffix = task.file.suffix.upper()
@@ -177,7 +154,18 @@ class UdcKind:
                 message += "; a UDC runs control-block tasks (.BLK) only"
                 found.findings.add("AMX6304", message, Span(task.line, 1, 2))
         in_order = tuple(sorted(tasks, key=lambda task: task.priority))
-        return UdcConfig(found.slot, found.model, in_order, _plants(found), found.span.line)
+        plants = _plants(found)
+        bases = [DRIVE_B if drive == "B" else 0 for drive, plant in plants.items() if plant.motor is not None]
+        shown = frozenset(base + number for base in bases for number in WRITTEN)
+        return UdcConfig(
+            **found.placed("udc"),
+            tick_ns=UDC_TICK_NS,
+            tasks=in_order,
+            registers=replace(UDC_REGISTERS, shown=shown) if shown else UDC_REGISTERS,
+            keeps_locals=False,
+            times=Model.UDC,
+            plants=plants,
+        )
 
     def check_places(self, rack: RackLayout) -> None:
         """Report too many UDCs; no source names a slot where one may not be."""

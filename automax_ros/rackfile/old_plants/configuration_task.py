@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from automax_ros.core.diagnostics import Diagnostic, Note, SourceText, Span, in_order
 from automax_ros.core.text import did_you_mean, quoted
@@ -94,8 +95,7 @@ class _Fault(Exception):
         self.diagnostic = Diagnostic(code, message, span, hint=hint, notes=notes)
 
 
-@dataclass(frozen=True)
-class _Given:
+class _Given(NamedTuple):
     key: Token
     value: Token | None
 
@@ -201,7 +201,7 @@ class _Reader:
         declared, span = self._variable(tokens)
         keys = {} if tokens.at_end else self._keys(tokens, None)
         if not {"SLOT", "DROP"} <= keys.keys():
-            self._tell_elsewhere(declared, span, word, "the statement lacks SLOT or DROP of its 57C404")
+            self._report_elsewhere(declared, span, word, "the statement lacks SLOT or DROP of its 57C404")
             return
         point = self._point(declared, span, word, keys, MAX_DROP_REGISTER)
         self._add(declared, span, word, point=point, drop=_number(keys["DROP"], 0, MAX_DROP))
@@ -218,9 +218,9 @@ class _Reader:
         declared, span = self._variable(tokens)
         if not tokens.at_end:
             self._keys(tokens, None)
-        self._tell_elsewhere(declared, span, word, _WHY_ELSEWHERE.get(word.text, "no module of the emulator has it"))
+        self._report_elsewhere(declared, span, word, _WHY_ELSEWHERE.get(word.text, "no module of the emulator has it"))
 
-    def _tell_elsewhere(self, declared: VariableName, span: Span, word: Token, why: str) -> None:
+    def _report_elsewhere(self, declared: VariableName, span: Span, word: Token, why: str) -> None:
         self._add(declared, span, word)
         message = f"{declared.name} is defined by {word.text}: {why}"
         hint = "it becomes a plain common; write `ros: in` if something outside of the rack supplies it"

@@ -71,15 +71,6 @@ class DraftedUdc:
     slot: int
     tasks: tuple[str, ...]
 
-    def lines(self, files: Mapping[str, str]) -> Iterator[str]:
-        """Yield its lines of the rack file; ``files`` are the texts for the tasks' files."""
-        yield f"  {self.slot}:"
-        yield f"    module: {_MODEL}"
-        yield "    tasks:"
-        yield from (
-            f"      {name}: {{{files[name]}drive: {drive}}}" for name, drive in zip(self.tasks, DRIVES, strict=False)
-        )
-
 
 def drafted_udcs(names: Sequence[str], programs: Mapping[str, Program | None], free: Iterator[int]) -> list[DraftedUdc]:
     """Return the modules of UDC tasks, in slots of ``free``."""
@@ -174,7 +165,7 @@ class Draft:
             commented(f"  0: {{module: {self._memory_module()}}}", "common memory"),
             *self._processor_lines(processors),
             *self._drive_lines(processors),
-            *(line for udc in udcs for line in udc.lines({task.name: _file_key(task) for task in self.tasks})),
+            *self._udc_lines(udcs),
             "common:" if self.commons else "common: {}",
             *self._common_lines(udcs),
         ]
@@ -185,7 +176,11 @@ class Draft:
 
     def _processor_lines(self, processors: int) -> Iterator[str]:
         tasks = [task for task in self.tasks if not task.on_udc]
-        periods = {task.name: self._period_ns(task) for task in tasks}
+        programs = [(task.name, self.results[task.name].program) for task in tasks]
+        periods = {
+            name: program.period_ns if program is not None and not program.is_basic else _UNKNOWN_NS
+            for name, program in programs
+        }
         ranks = sorted(set(periods.values()))
         share = -(-len(tasks) // processors)
         for number in range(processors):
@@ -197,8 +192,10 @@ class Draft:
             for task in own:
                 priority = min(MIN_PRIORITY + ranks.index(periods[task.name]), MAX_PRIORITY)
                 period = periods[task.name]
-                scanned = period < _UNKNOWN_NS
-                comment = f"a scan every {period / NS_PER_MS:g} ms" if scanned else _without_period(task)
+                comment = f"a scan every {period / NS_PER_MS:g} ms"
+                if period >= _UNKNOWN_NS:
+                    is_basic = kind_of_source(task.file) is TaskKind.BASIC
+                    comment = "a BASIC task" if is_basic else "see `automax check`"
                 yield commented(f"      {task.name}: {{{_file_key(task)}priority: {priority}}}", comment)
 
     @property
@@ -233,9 +230,12 @@ class Draft:
         for slot in sorted(lines):
             yield from lines[slot]
 
-    def _period_ns(self, task: DraftedTask) -> int:
-        program = self.results[task.name].program
-        return program.period_ns if program is not None and not program.is_basic else _UNKNOWN_NS
+    def _udc_lines(self, udcs: Sequence[DraftedUdc]) -> Iterator[str]:
+        files = {task.name: _file_key(task) for task in self.tasks}
+        for udc in udcs:
+            yield from (f"  {udc.slot}:", f"    module: {_MODEL}", "    tasks:")
+            for name, drive in zip(udc.tasks, DRIVES, strict=False):
+                yield f"      {name}: {{{files[name]}drive: {drive}}}"
 
     def _common_lines(self, udcs: Sequence[DraftedUdc]) -> Iterator[str]:
         simple = 0
@@ -268,11 +268,8 @@ def _drive_modules(program: Program | None) -> list[tuple[int, str]]:
 
 
 def _file_key(task: DraftedTask) -> str:
-    return "" if task.file == f"{task.name}.BLK" else f"file: {_yaml_quoted(task.file)}, "
-
-
-def _without_period(task: DraftedTask) -> str:
-    return "a BASIC task" if kind_of_source(task.file) is TaskKind.BASIC else "see `automax check`"
+    quoted_file = "'" + task.file.replace("'", "''") + "'"
+    return "" if task.file == f"{task.name}.BLK" else f"file: {quoted_file}, "
 
 
 def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
@@ -368,7 +365,3 @@ def rack_name(title: str) -> str:
 def commented(line: str, comment: str) -> str:
     """Return a line of a rack file with a comment."""
     return f"{line:<{_COMMENT_COLUMN}} # {comment}"
-
-
-def _yaml_quoted(text: str) -> str:
-    return "'" + text.replace("'", "''") + "'"

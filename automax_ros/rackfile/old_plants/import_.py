@@ -9,7 +9,6 @@ from pathlib import Path
 from automax_ros.core.diagnostics import Diagnostic, Span
 from automax_ros.core.types import declaration_text
 from automax_ros.rackfile.model.module import MAX_TASKS
-from automax_ros.rackfile.modules.io import HasTable
 from automax_ros.rackfile.modules.registry import KINDS
 from automax_ros.rackfile.old_plants.configuration_task import Configuration, DefinedCommon, DefinedTask
 from automax_ros.rackfile.old_plants.draft import commented, rack_name
@@ -141,7 +140,6 @@ def _with_registers(highest: int) -> list[str]:
     return [
         number
         for kind in KINDS
-        if isinstance(kind, HasTable)
-        for number, model in kind.table.items()
-        if highest < model.registers.count and highest not in model.registers.reserved
+        for number, registers in kind.table.items()
+        if highest < registers.count and highest not in registers.reserved
     ]

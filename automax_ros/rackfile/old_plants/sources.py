@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.text import count_of
@@ -52,14 +53,6 @@ class Converted:
         return bool(self.notes)
 
 
-@dataclass
-class _Counts:
-    numbers: dict[str, int] = field(default_factory=dict)
-
-    def add(self, thing: str) -> None:
-        self.numbers[thing] = self.numbers.get(thing, 0) + 1
-
-
 def convert(data: bytes, check: Check) -> Converted:
     """Return a source made acceptable; ``check`` finds what is left to change.
 
@@ -78,9 +71,14 @@ def convert(data: bytes, check: Check) -> Converted:
     before = text.replace("\r\n", "\n").replace("\r", "\n")
     if ends:
         notes.append(f"{count_of(ends, 'line end')} written as LF")
-    counts = _Counts()
-    after = _stable(before, check, counts)
-    notes += [count_of(number, thing) for thing, number in counts.numbers.items()]
+    counts: Counter[str] = Counter()
+    after = before
+    for _ in range(_MOST_ROUNDS):
+        changed = _with_constants(_in_upper_case(_without_control(after, counts), counts), check, counts)
+        if changed == after:
+            break
+        after = changed
+    notes += [count_of(number, thing) for thing, number in counts.items()]
     return Converted(before, after, after.encode(encoding), tuple(notes))
 
 
@@ -99,16 +97,7 @@ def _decoded(data: bytes) -> tuple[str, str, list[str]]:
         return plain.decode("latin-1"), "latin-1", notes
 
 
-def _stable(text: str, check: Check, counts: _Counts) -> str:
-    for _ in range(_MOST_ROUNDS):
-        changed = _with_constants(_in_upper_case(_without_control(text, counts), counts), check, counts)
-        if changed == text:
-            break
-        text = changed
-    return text
-
-
-def _without_control(text: str, counts: _Counts) -> str:
+def _without_control(text: str, counts: Counter[str]) -> str:
     lines = text.split("\n")
     quoted, _ = _ranges(text)
     for row, line in enumerate(lines):
@@ -117,23 +106,23 @@ def _without_control(text: str, counts: _Counts) -> str:
     return "\n".join(lines)
 
 
-def _plain(line: str, quoted: list[range], counts: _Counts) -> str:
+def _plain(line: str, quoted: list[range], counts: Counter[str]) -> str:
     result: list[str] = []
     width = 0
     for column, char in enumerate(line):
         text = char
         if _CONTROL.match(char):
             text = " "
-            counts.add("control character")
+            counts["control character"] += 1
         elif char == "\t" and not any(column in part for part in quoted):
             text = " " * (_TAB - width % _TAB)
-            counts.add("tab")
+            counts["tab"] += 1
         result.append(text)
         width += len(text)
     return "".join(result)
 
 
-def _in_upper_case(text: str, counts: _Counts) -> str:
+def _in_upper_case(text: str, counts: Counter[str]) -> str:
     lines = text.split("\n")
     quoted, remarks = _ranges(text)
     for row, line in enumerate(lines):
@@ -145,7 +134,7 @@ def _in_upper_case(text: str, counts: _Counts) -> str:
             for column, char in enumerate(line)
         )
         if upper != line:
-            counts.add("lower-case line")
+            counts["lower-case line"] += 1
             lines[row] = upper
     return "\n".join(lines)
 
@@ -184,7 +173,7 @@ class _Silent(Reporter):
         """Discard a diagnostic."""
 
 
-def _with_constants(text: str, check: Check, counts: _Counts) -> str:
+def _with_constants(text: str, check: Check, counts: Counter[str]) -> str:
     lines = text.split("\n")
     found = [item for item in check(text) if item.code in _CURES]
     for item in sorted(found, key=lambda item: item.span, reverse=True):
@@ -193,7 +182,7 @@ def _with_constants(text: str, check: Check, counts: _Counts) -> str:
         cured = cure(lines[row][start:end], lines[row][:start])
         if cured is not None:
             lines[row] = lines[row][:start] + cured + lines[row][end:]
-            counts.add(thing)
+            counts[thing] += 1
     return "\n".join(lines)
 
 

@@ -73,7 +73,7 @@ def lies_next_to(path: Path, other: Path) -> bool:
     If every installed file is a link to its source (colcon), a rack file and its tasks meet there.
     """
     try:
-        return path.resolve().is_relative_to(other.resolve().parent)
+        return is_inside(path, other.resolve().parent)
     except (OSError, ValueError, RuntimeError):
         return False
 

@@ -71,13 +71,13 @@ _ROS = Key(
     _direction,
 )
 RATE = number_key("rate_limit_hz", "Most messages per second on the topic.", 0.01, 2000.0, "AMX6408")
-"""Its range is ours (decision: 2000 Hz is one message per tick of 0.5 ms)."""
+"""Range of `rate_limit_hz`, 0.01 to 2000 Hz (decision: 2000 Hz is one message per tick of 0.5 ms)."""
 _NON_VOLATILE = flag_key("non_volatile", "Whether the value survives STOP ALL, a power cycle and a restart.")
 UNIT, DESCRIPTION = (
     text_key("unit", line("The engineer's unit.", 16)),
     text_key("description", line("A line about the variable.", 200), 200),
 )
-"""Their lengths are ours (decision)."""
+"""Longest `unit` and longest `description`, 16 and 200 characters (decision)."""
 OPTIONS: Keys = {
     **schemas(_ROS, RATE),
     "preset": either(
@@ -143,14 +143,19 @@ class CommonReader:
         self._names: dict[str, Span] = {}
         self._bare: dict[str, tuple[str, Span]] = {}
         self._simple = 0
-        self._left_closed: list[CommonVariable] = []
-        self._left_span = Span(1, 1, 2)
+        self._left_closed: list[tuple[str, Span]] = []
 
     def read(self, node: Node) -> tuple[CommonVariable, ...]:
         """Return the variables without errors, in the order of the file."""
         entries = entries_of(node, "common", self._findings) or ()
         variables = [self._variable(key, value) for key, value in entries]
-        self._report_left_closed()
+        if self._left_closed:
+            name, span = self._left_closed[0]
+            message = (
+                f"{len(self._left_closed)} simple commons from {name} on have no topic: "
+                f"without the key ros only the first {DEFAULT_OUT_LIMIT} of a rack are published"
+            )
+            self._findings.add("AMX6412", message, span, "write ros: out or ros: closed for each of them")
         return tuple(item for item in variables if item is not None)
 
     def _variable(self, key: Scalar, node: Node) -> CommonVariable | None:
@@ -233,18 +238,8 @@ class CommonReader:
             return Direction.CLOSED
         if self._simple <= DEFAULT_OUT_LIMIT:
             return Direction.OUT
-        if not self._left_closed:
-            self._left_span = key.span
-        self._left_closed.append(variable)
+        self._left_closed.append((variable.name, key.span))
         return Direction.CLOSED
-
-    def _report_left_closed(self) -> None:
-        if self._left_closed:
-            message = (
-                f"{len(self._left_closed)} simple commons from {self._left_closed[0].name} on have no topic: "
-                f"without the key ros only the first {DEFAULT_OUT_LIMIT} of a rack are published"
-            )
-            self._findings.add("AMX6412", message, self._left_span, "write ros: out or ros: closed for each of them")
 
     def _rate(self, section: Section, name: str, direction: Direction) -> float | None:
         rate = section.read(RATE)

@@ -21,7 +21,7 @@ NUMBERS = (
     number_key("stiffness_nm_per_rad", "Stiffness at this shaft; without it stiff.", 1.0, 1e7, CODE),
     _DAMPING,
 )
-"""The numbers of a coupling, with ranges of ours (decision)."""
+"""The numbers of a coupling, and their ranges (decision)."""
 KEYS: Keys = schemas(_TO, *NUMBERS)
 SCHEMA: Schema = section("What couples the shaft to that of another plant.", KEYS, ("to",))
 

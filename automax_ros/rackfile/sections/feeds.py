@@ -39,7 +39,7 @@ _SIGNAL = choice_key(
 )
 _USUAL_MS = 1.0
 EVERY_MS = number_key("every_ms", "How often it is written, ms.", 0.1, 10_000.0, CODE, _USUAL_MS)
-"""Its range and its default are ours (decision: an instrument is quicker than most scans)."""
+"""Range of ``every_ms``, 0.1 ms to 10 s, and its default, 1 ms (decision: an instrument is quicker than most scans)."""
 KEYS: Keys = {**schemas(_SIGNAL, EVERY_MS), "scale": SCALE}
 """The keys of a feed."""
 _FED = r"^[A-Za-z_][A-Za-z0-9_]{0,15}[%!]?\s*([(\[][0-9, ]*[)\]])?$"

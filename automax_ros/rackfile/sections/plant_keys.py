@@ -24,7 +24,7 @@ SUPPLY = (
     number_key("ls_mh", "Source inductance of a phase, mH.", 0.001, 10.0, CODE),
     number_key("rs_mohm", "Source resistance of a phase, milliohm.", 0.0, 1000.0, CODE, 5),
 )
-"""Numbers of a line, with ranges of ours (decision: lines of these drives; without inductance a shorted SCR had no
+"""Numbers of a line, and their ranges (decision: lines of these drives; without inductance a shorted SCR had no
 limit)."""
 _ROTATION = choice_key(
     "rotation",
@@ -41,9 +41,9 @@ _SPEED = number_key(
     "speed_rpm", "The speed at which the shaft is held; alone. 0 is a locked rotor.", -10_000.0, 10_000.0, CODE
 )
 LOAD = (_TORQUE, number_key("friction_nm", "Coulomb friction, N m.", 0.0, 1e6, CODE, 0), _SPEED)
-"""Numbers of a load, with ranges of ours (decision)."""
+"""Numbers of a load, and their ranges (decision)."""
 INERTIA = number_key("inertia", "Inertia of motor and load over the motor's own.", 1.0, 10_000.0, CODE, 1)
-"""Its range is ours (decision): it includes the motor's own, which is 1."""
+"""Range of ``inertia``, 1 to 10000 (decision): it includes the motor's own, which is 1."""
 MOST_PAIRS = 100
 """Most pairs of ``torque_per_rpm`` (decision)."""
 _FROM_ROS = choice_key(

@@ -11,13 +11,10 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.module import Registers
-from automax_ros.rackfile.modules.io import HasTable
 from automax_ros.rackfile.modules.registry import KINDS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "modules.md").read_text(encoding="utf-8")
-MODELS = {
-    number: model.registers for kind in KINDS if isinstance(kind, HasTable) for number, model in kind.table.items()
-}
+MODELS = {number: model.registers for kind in KINDS for number, model in getattr(kind, "table", {}).items()}
 
 
 def rows() -> dict[str, dict[int, str]]:
