@@ -14,7 +14,7 @@ from automax_ros.rackfile.model.module import Registers
 from automax_ros.rackfile.modules.registry import KINDS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "modules.md").read_text(encoding="utf-8")
-MODELS = {number: model.registers for kind in KINDS for number, model in getattr(kind, "table", {}).items()}
+MODELS = {number: registers for kind in KINDS for number, registers in kind.table.items()}
 
 
 def rows() -> dict[str, dict[int, str]]:
