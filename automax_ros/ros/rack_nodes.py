@@ -448,24 +448,6 @@ class LiveRack:
             self._process.spin(self.nodes.nodes[0].guard)
         self.stream, self.health, self.bus = self.nodes.stream, self.nodes.health, self.nodes.bus
 
-    @property
-    def missing(self) -> list[str]:
-        """The other processes of a distributed rack that are absent."""
-        return self.bus.missing if self.bus is not None else []
-
-    @property
-    def is_joining(self) -> bool:
-        """Whether the rack already ran in other processes when this one started."""
-        return self.bus is not None and self.bus.joining
-
-    def await_others(self, should_stop: Callable[[], bool]) -> bool:
-        """Wait for the other processes of a distributed rack; return False if asked to stop.
-
-        Raises:
-            ProcessAlreadyRuns: another process of this run has the same modules.
-        """
-        return self.nodes.await_others(should_stop)
-
     def start(self, settings: list[tuple[str, Value]], first: Callable[[], None] | None = None) -> None:
         """Begin the stream and put the rack into RUN (``Rack.start``); rack time 0 follows shortly."""
         self.nodes.start(settings, first, paced=False)

@@ -17,51 +17,22 @@ from typing import IO
 from automax_ros.cli.output.signals import StopRequest
 
 _MOST_BYTES = 64_000_000
-"""Longest line that is kept, bytes (decision): a report with all commons is much shorter."""
-_READ_BYTES = 1 << 16
-
-
-class Lines:
-    """Reads one output stream of a child line by line."""
-
-    def __init__(self, stream: IO[bytes], hear: Callable[[str], None]) -> None:
-        """Read from a pipe; ``hear`` is called with each line."""
-        self._stream, self._hear = stream, hear
-        self._rest = b""
-        os.set_blocking(stream.fileno(), False)
-
-    def fileno(self) -> int:
-        """Return the file descriptor to wait for."""
-        return self._stream.fileno()
-
-    def read(self) -> bool:
-        """Read what is available now; return FALSE at the stream's end."""
-        try:
-            data = os.read(self.fileno(), _READ_BYTES)
-        except BlockingIOError:
-            return True
-        *lines, self._rest = (self._rest + data).split(b"\n")
-        if not data or len(self._rest) > _MOST_BYTES:
-            lines, self._rest = [*lines, *([self._rest] if self._rest else [])], b""
-        for line in lines:
-            self._hear(line.decode("utf-8", "backslashreplace").rstrip("\r"))
-        return bool(data)
-
-    def close(self) -> None:
-        """Close the pipe."""
-        self._stream.close()
+"""Longest line that is kept whole, bytes (decision): a report with all commons is much shorter."""
 
 
 class Child:
-    """A process that has been started. ``out`` and ``err`` are its output streams."""
+    """A process that has been started, with a thread for each of its output streams."""
 
-    def __init__(self, command: Sequence[str], hear: Callable[[str], None], complain: Callable[[str], None]) -> None:
-        """Start the process; ``hear`` is called with each line of standard output, ``complain`` of standard error."""
+    def __init__(
+        self, command: Sequence[str], on_line: Callable[[str], None], on_stderr: Callable[[str], None]
+    ) -> None:
+        """Start the process; the functions are called, each on its own thread, with the lines of both streams."""
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True)
-        assert self._process.stdout is not None
-        assert self._process.stderr is not None
-        self.out, self.err = Lines(self._process.stdout, hear), Lines(self._process.stderr, complain)
+        streams = (self._process.stdout, on_line), (self._process.stderr, on_stderr)
+        self._readers = [threading.Thread(target=_read, args=pair, daemon=True) for pair in streams]
+        for reader in self._readers:
+            reader.start()
 
     @property
     def pid(self) -> int:
@@ -73,18 +44,28 @@ class Child:
         """The exit code, less than 0 where a signal has ended it, None while it runs."""
         return self._process.poll()
 
+    @property
+    def is_read(self) -> bool:
+        """Whether the functions have been called with all of its output."""
+        return not any(reader.is_alive() for reader in self._readers)
+
     def send(self, number: signal.Signals) -> None:
         """Send a signal, unless the process has ended."""
         self._process.send_signal(number)
 
     def close(self) -> None:
-        """Kill the child if it still runs, and close its streams."""
+        """Kill the child if it still runs, and close its standard input."""
         if self.code is None:
             self._process.kill()
             self._process.wait()
-        for stream in (self.out, self.err, self._process.stdin):
-            if stream is not None:
-                stream.close()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+
+
+def _read(stream: IO[bytes], on_line: Callable[[str], None]) -> None:
+    with stream:
+        while line := stream.readline(_MOST_BYTES):
+            on_line(line.decode("utf-8", "backslashreplace").rstrip("\r\n"))
 
 
 def end_with_watcher(stop: StopRequest) -> None:

@@ -49,7 +49,7 @@ def run_distributed(plan: RunPlan, arguments: argparse.Namespace, stop: StopRequ
         watch = _Watch(plan, seats)
         watch.message(_opening(plan, seats, domain))
         posts = list(_posts(plan, seats, arguments))
-        supervisor = Supervisor(posts, watch, restart=arguments.restart)
+        supervisor = Supervisor(posts, watch.receive, watch.print_error, watch.print_death, restart=arguments.restart)
         supervisor.run(lambda: stop.requested)
         return watch.conclude(supervisor)
 
@@ -105,7 +105,6 @@ def _given(option: str, values: Sequence[str] | None) -> list[str]:
 
 
 def _seconds(time_ns: int) -> str:
-    """Return a time in seconds with all nine decimals."""
     return f"{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d}"
 
 
@@ -119,8 +118,6 @@ def _opening(plan: RunPlan, seats: Sequence[RackProcess], domain: int) -> str:
 
 
 class _Watch:
-    """Shows the output of the processes and merges their progress, summaries and reports."""
-
     def __init__(self, plan: RunPlan, seats: Sequence[RackProcess]) -> None:
         self._plan, self._names = plan, [seat.name for seat in seats]
         self._home = self._names[0]
@@ -130,7 +127,7 @@ class _Watch:
         self._summaries: dict[str, Summary] = {}
         self._reports: dict[str, Any] = {}
 
-    def heard(self, name: str, told: ProcessMessage) -> None:
+    def receive(self, name: str, told: ProcessMessage) -> None:
         """Show a message of a process; progress is shown merged, summaries and reports are kept for the end."""
         if isinstance(told, TextLine):
             self.message(f"{name}: {told.text}")
@@ -144,11 +141,11 @@ class _Watch:
         elif told.report:  # the report of a process that has not begun is empty
             self._reports[name] = told.report
 
-    def complained(self, name: str, line: str) -> None:
+    def print_error(self, name: str, line: str) -> None:
         """Show a line that a process has written on standard error."""
         print(f"{name}: {line}", file=sys.stderr, flush=True)
 
-    def died(self, name: str, how: str, again_s: float | None) -> None:
+    def print_death(self, name: str, how: str, again_s: float | None) -> None:
         """Show that a process has died."""
         self._progress.pop(name, None)
         again = f"it is started again in {again_s:.1f} s" if again_s is not None else "it is not started again"

@@ -36,12 +36,7 @@ _NEVER_NS = 1 << 63
 
 
 class LiveSession:
-    """One rack with its nodes: ``start`` it, ``run`` it any number of times, always ``close`` it.
-
-    Attributes:
-        live: the rack in its nodes.
-        has_begun: whether it was started.
-    """
+    """One rack with its nodes: ``start`` it, ``run`` it any number of times, always ``close`` it."""
 
     def __init__(
         self, plan: RunPlan, process: RosProcess, manager: RackNode | None, stop: StopRequest, domain: int
@@ -106,7 +101,7 @@ class LiveSession:
             return False
         self.has_begun = True
         self.live.start([*self._state.settings, *self.plan.settings], self._stimulation.begin)
-        if self.live.is_joining:
+        if self.live.bus is not None and self.live.bus.joining:
             self._stimulation.begin(joining=True)
         return True
 
@@ -168,14 +163,15 @@ class LiveSession:
         """Wait for the other processes of a distributed rack; FALSE where a stop is requested first."""
         told_ns = time.monotonic_ns() + PATIENCE_NS
 
-        def look() -> bool:
+        def should_stop() -> bool:
             nonlocal told_ns
-            if self.live.missing and time.monotonic_ns() > told_ns:
+            missing = self.live.bus.missing if self.live.bus is not None else []
+            if missing and time.monotonic_ns() > told_ns:
                 told_ns = _NEVER_NS
-                self._display.message(f"waiting for {', '.join(self.live.missing)}")
+                self._display.message(f"waiting for {', '.join(missing)}")
             return stop.requested
 
-        return self.live.await_others(look)
+        return self.live.nodes.await_others(should_stop)
 
     def _chores(self, now_ns: int) -> None:
         self._display.update(now_ns)

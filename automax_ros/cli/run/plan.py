@@ -12,7 +12,7 @@ from automax_ros.cli.options.work import tell_native
 from automax_ros.cli.output.files import write_report
 from automax_ros.cli.output.screen import tell_warnings
 from automax_ros.cli.run.process_messages import ProcessOutput, tell_report
-from automax_ros.cli.run.status import RunOutput, TerminalOutput
+from automax_ros.cli.run.status import TerminalOutput
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.types import Value
 from automax_ros.rack.operator.retention import default_folder
@@ -107,7 +107,7 @@ class RunPlan:
         return watched(rack.config, None, [program for program in programs if program is not None])
 
     @property
-    def screen(self) -> RunOutput:
+    def screen(self) -> TerminalOutput:
         """Where the run is shown."""
         return ProcessOutput() if self.is_watched else TerminalOutput()
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import sys
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from automax_ros.cli.run.status import Progress, Summary
+from automax_ros.cli.run.status import Progress, Summary, TerminalOutput
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 
@@ -35,21 +34,13 @@ ProcessMessage = TextLine | Progress | Summary | Reported
 """A message, parsed from a line."""
 
 
-class ProcessOutput:
-    """The output of a process that another one has started (``cli/run/status.RunOutput``)."""
+class ProcessOutput(TerminalOutput):
+    """Sends the output of a process to the one that has started it."""
 
     def __init__(self) -> None:
         """Create the output; nothing is sent yet."""
-        self.began_ns = self._last_ns = time.monotonic_ns()
-
-    def due(self) -> int:
-        """Return the ns since the last progress if it is time for the next, else 0."""
-        now = time.monotonic_ns()
-        passed = now - self._last_ns
-        if passed < _PERIOD_NS:
-            return 0
-        self._last_ns = now
-        return passed
+        super().__init__()
+        self._period_ns = _PERIOD_NS
 
     def progress(self, progress: Progress) -> None:
         """Send the progress of the process."""

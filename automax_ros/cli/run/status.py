@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 from automax_ros.cli.output.screen import StatusLine
 from automax_ros.core.text import count_of, printable
@@ -25,14 +24,9 @@ from automax_ros.runtime.health import Health
 class Progress:
     """The progress of a run.
 
-    Attributes:
-        now_ns: rack time.
-        standing: what keeps the tasks from running, such as ``power off``.
-        scans_per_s: scans per second of rack time since the last progress.
-        loads: loads of the Processors, in words.
-        pace: how many times faster than real time the run is, None on the wall clock, where ``loads`` are shown.
-        trouble: counts of what went wrong, by its kind in words.
-        values: the watched variables with their values.
+    ``standing`` is what keeps the tasks from running, such as ``power off``; ``scans_per_s`` counts since the last
+    progress. ``loads`` of the Processors are in words. ``pace`` is how many times faster than real time the run is,
+    None on the wall clock. ``trouble`` counts what went wrong by its kind; ``values`` are the watched variables.
     """
 
     now_ns: int
@@ -71,13 +65,8 @@ def merged_progress(parts: Sequence[Progress]) -> Progress:
 class Summary:
     """The summary of a run.
 
-    Attributes:
-        seconds: rack time that has passed.
-        live: whether execution times were measured.
-        rows: the rows of the table of tasks.
-        notes: the lines after the table.
-        values: the watched variables with their values.
-        took_s: seconds that a run in simulated time took, None for one on the wall clock.
+    ``seconds`` is rack time; ``live``: execution times were measured. ``rows`` are those of the table of tasks,
+    ``notes`` follow it, ``values`` are the watched variables. ``took_s`` is None for a run on the wall clock.
     """
 
     seconds: float
@@ -112,47 +101,16 @@ def recorded_size(folder: Path) -> str:
         return "cannot be read any more"
 
 
-class RunOutput(Protocol):
-    """The output that shows a run."""
-
-    @property
-    def began_ns(self) -> int:
-        """When the output was created, in ns of the monotonic clock."""
-        ...
-
-    def due(self) -> int:
-        """Return the ns since the last progress if it is time for the next, which the caller shows then, else 0."""
-        ...
-
-    def progress(self, progress: Progress) -> None:
-        """Show the progress of the run."""
-        ...
-
-    def message(self, text: str) -> None:
-        """Show a separate line."""
-        ...
-
-    def summary(self, summary: Summary) -> None:
-        """Show the summary of the run."""
-        ...
-
-
-class TerminalOutput:
+class TerminalOutput(StatusLine):
     """Shows a run on standard output."""
 
-    def __init__(self) -> None:
-        """Create the output; nothing is printed yet."""
-        self._line = StatusLine()
-        self.began_ns = self._line.began_ns
-        self.due, self.message = self._line.due, self._line.message
-
     def progress(self, progress: Progress) -> None:
-        """Show the status line; on a terminal it replaces the last one."""
-        self._line.show(progress.parts)
+        """Show the progress; on a terminal it replaces the last one."""
+        self.show(progress.parts)
 
     def summary(self, summary: Summary) -> None:
         """Print the summary in place of the status line."""
-        self._line.clear()
+        self.clear()
         print("\n".join(summary.lines), flush=True)
 
 
@@ -169,11 +127,11 @@ class StatusDisplay:
         *,
         live: bool,
         health: Health | None = None,
-        screen: RunOutput | None = None,
+        screen: TerminalOutput | None = None,
     ) -> None:
         """Create the display; nothing is shown before the first update is due. ``screen`` None is standard output."""
         self._rack, self._watch, self._live, self._health = rack, watch, live, health
-        self._screen: RunOutput = TerminalOutput() if screen is None else screen
+        self._screen = TerminalOutput() if screen is None else screen
         self.message = self._screen.message
         self._last_rack_ns = 0
         self._last_scans = 0
@@ -205,7 +163,6 @@ class StatusDisplay:
             self.message(f"recorded {bag}: {recorded_size(bag)}{rest}")
 
     def _rows(self) -> Iterator[str]:
-        """Yield the summary's row of each task."""
         for task in self._rack.tasks:
             statistics = self._rack.statistics[task.name]
             period = f"{task.period_ns / 1e6:g}" if task.period_ns else "-"
@@ -215,7 +172,6 @@ class StatusDisplay:
             yield row + (f"{mean:>10.1f}{statistics.longest_ns / 1000:>12.1f}" if self._live else "")
 
     def _notes(self) -> Iterator[str]:
-        """Yield the summary's lines about interrupts and errors."""
         for module in self._rack.modules if self._live else ():
             if isinstance(module, DriveControllerModule) and module.timing.interrupts:
                 yield f"  {module.config.name}: {module.timing.describe()}"
@@ -228,7 +184,6 @@ class StatusDisplay:
             self.message(printable(text))
 
     def _progress(self, now_ns: int, passed_ns: int) -> Progress:
-        """Return the rack's progress, ``passed_ns`` of the wall clock after the last one."""
         scans = sum(item.scans for item in self._rack.statistics.values())
         rack_ns = now_ns - self._last_rack_ns
         rate = (scans - self._last_scans) * NS_PER_S / rack_ns if rack_ns else 0.0
@@ -245,7 +200,6 @@ class StatusDisplay:
         return () if operations.stopped is None else (operations.stopped.title,)
 
     def _load(self, module: Module, passed_ns: int) -> str:
-        """Return a Processor's load since the last line, and the number of deadlines it has missed."""
         slot = module.config.slot
         busy = sum(item.statistics.total_ns for item in module.tasks)
         share = (busy - self._last_busy.get(slot, 0)) / passed_ns
@@ -254,7 +208,6 @@ class StatusDisplay:
         return f"P{slot} {100 * share:.1f} % late {late}"
 
     def _trouble(self) -> dict[str, int]:
-        """Return the counts of what went wrong."""
         errors = {"run-time error": sum(task.errors.count for task in self._rack.tasks)}
         return dict(self._health.counts) if self._health else errors
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import selectors
+import queue
 import signal
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Protocol
 
-from automax_ros.cli.run.child_process import Child, Lines
+from automax_ros.cli.run.child_process import Child
 from automax_ros.cli.run.process_messages import ProcessMessage, Reported, heard
 from automax_ros.cli.run.status import Progress
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
@@ -24,7 +23,9 @@ WINDOW_NS = 10 * NS_PER_S
 """Time within which deaths are counted together (decision)."""
 
 
-_LOOK_S = 0.05
+_POLL_S = 0.05
+_MOST_LINES = 1000
+"""Lines that wait to be shown; children that write more wait."""
 STAGE_NS = 800 * NS_PER_MS
 """Time that the processes of a stage have to end before those of the next are asked to."""
 END_NS = 10 * NS_PER_S
@@ -34,12 +35,7 @@ GRACE_NS = 2 * NS_PER_S
 
 
 class Restarts:
-    """The deaths of one process; times are ns of any one clock.
-
-    Attributes:
-        count: number of deaths.
-        given_up: whether the process is not started again.
-    """
+    """The deaths of one process; times are ns of any one clock."""
 
     def __init__(self) -> None:
         """Create the record of a process that has not died."""
@@ -60,14 +56,9 @@ class Restarts:
 class ProcessSpec:
     """A process to keep running.
 
-    Attributes:
-        name: its name in messages and reports.
-        command: the command line that starts it.
-        stage: processes of the lowest stage are ended first; all others end when one with ``ends_run`` has ended.
-        ends_run: whether the run ends with it.
-        reports: whether it sends a report when it ends cleanly; one that does not is never restarted.
-        begins_run: whether the run of the processes with ``ends_run`` cannot begin without it.
-        after_ns: time that the processes of the stage before have to end before this one is asked to.
+    Processes of the lowest ``stage`` are ended first, each at the earliest ``after_ns`` after the stage before. All end
+    when one with ``ends_run`` has ended; those cannot begin without one that ``begins_run``. A process ``reports`` when
+    it ends cleanly; one that does not is never restarted.
     """
 
     name: str
@@ -77,22 +68,6 @@ class ProcessSpec:
     reports: bool = True
     begins_run: bool = False
     after_ns: int = STAGE_NS
-
-
-class Listener(Protocol):
-    """Receives the messages and the deaths of processes."""
-
-    def heard(self, name: str, told: ProcessMessage) -> None:
-        """Receive a message of a process."""
-        ...
-
-    def complained(self, name: str, line: str) -> None:
-        """Receive a line that a process has written on standard error."""
-        ...
-
-    def died(self, name: str, how: str, again_s: float | None) -> None:
-        """Receive the death of a process, which is restarted after ``again_s`` seconds, or not if that is None."""
-        ...
 
 
 @dataclass
@@ -118,15 +93,20 @@ class Supervisor:
     def __init__(
         self,
         posts: Sequence[ProcessSpec],
-        listener: Listener,
+        on_message: Callable[[str, ProcessMessage], None],
+        on_stderr: Callable[[str, str], None],
+        on_death: Callable[[str, str, float | None], None],
         *,
         restart: bool = True,
-        clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Create a supervisor of processes, which are started in this order by ``run``."""
+        """Create a supervisor of processes, which are started in this order by ``run``.
+
+        The functions are called in ``run`` with a process's name: ``on_message`` with its message, ``on_stderr`` with a
+        line of its standard error, ``on_death`` with how it died and the seconds until its restart (None: no restart).
+        """
         self._places = [_Supervised(post) for post in posts]
-        self._listener, self._restart, self._clock = listener, restart, clock
-        self._selector = selectors.DefaultSelector()
+        self._on_message, self._on_stderr, self._on_death, self._restart = on_message, on_stderr, on_death, restart
+        self._lines: queue.Queue[tuple[Callable[[str], None], str]] = queue.Queue(_MOST_LINES)
         self._stage = -1
         self._stage_ns = self._asked_ns = 0
 
@@ -152,7 +132,7 @@ class Supervisor:
                 if should_stop():
                     self._end(0)
                 self._start_due()
-                self._listen()
+                self._receive()
                 for place in self._places:
                     if place.child is not None and place.child.code is not None:
                         self._over(place, place.child)
@@ -161,37 +141,39 @@ class Supervisor:
             for place in self._places:
                 if place.child is not None:
                     place.child.close()
-            self._selector.close()
 
     def _start_due(self) -> None:
         for place in self._places:
-            if place.start_ns is not None and place.start_ns <= self._clock():
+            if place.start_ns is not None and place.start_ns <= time.monotonic_ns():
                 place.start_ns = None
-                name = place.post.name
-                child = Child(place.post.command, partial(self._hear, place), partial(self._listener.complained, name))
-                place.child = child
-                for stream in (child.out, child.err):
-                    self._selector.register(stream, selectors.EVENT_READ)
+                actions = partial(self._message, place), partial(self._on_stderr, place.post.name)
+                on_line, on_stderr = (partial(self._queue, action) for action in actions)
+                place.child = Child(place.post.command, on_line, on_stderr)
 
-    def _listen(self) -> None:
-        for key, _ in self._selector.select(_LOOK_S):
-            assert isinstance(key.fileobj, Lines)
-            if not key.fileobj.read():
-                self._selector.unregister(key.fileobj)
+    def _queue(self, action: Callable[[str], None], line: str) -> None:
+        self._lines.put((action, line))
 
-    def _hear(self, place: _Supervised, line: str) -> None:
+    def _receive(self) -> None:
+        """Handle the lines that wait, or the next one within a short time."""
+        try:
+            action, line = self._lines.get(timeout=_POLL_S)
+            action(line)
+            for _ in range(self._lines.qsize()):
+                action, line = self._lines.get_nowait()
+                action(line)
+        except queue.Empty:
+            pass
+
+    def _message(self, place: _Supervised, line: str) -> None:
         told = heard(line)
         place.has_begun = place.has_begun or isinstance(told, Progress)
         place.reported = place.reported or isinstance(told, Reported)
-        self._listener.heard(place.post.name, told)
+        self._on_message(place.post.name, told)
 
     def _over(self, place: _Supervised, child: Child) -> None:
         """Handle the end of a process: record its exit code, restart it, or end the run."""
-        for stream in (child.out, child.err):
-            while stream in self._selector.get_map() and stream.read():
-                pass
-            if stream in self._selector.get_map():
-                self._selector.unregister(stream)
+        while not (child.is_read and self._lines.empty()):
+            self._receive()
         code, place.child = child.code, None
         assert code is not None
         child.close()
@@ -205,10 +187,10 @@ class Supervisor:
             if place.post.ends_run or not in_order or keeps_from_beginning:
                 self._end(GRACE_NS if in_order and not keeps_from_beginning else 0)
             return
-        again_ns = place.restarts.died(self._clock())
+        again_ns = place.restarts.died(time.monotonic_ns())
         place.start_ns = again_ns if self._restart else None
-        again_s = None if place.start_ns is None else max(0, place.start_ns - self._clock()) / NS_PER_S
-        self._listener.died(place.post.name, _how(code), again_s)
+        again_s = None if place.start_ns is None else max(0, place.start_ns - time.monotonic_ns()) / NS_PER_S
+        self._on_death(place.post.name, _how(code), again_s)
         if place.start_ns is None:
             place.code = code
             if place.post.ends_run:
@@ -222,13 +204,13 @@ class Supervisor:
         """Begin to end all processes after ``grace_ns``; a second call does nothing."""
         if self._stage < 0:
             self._stage = 0
-            self._asked_ns = self._clock() + grace_ns
+            self._asked_ns = time.monotonic_ns() + grace_ns
             for place in self._places:
                 place.start_ns = None
 
     def _go_on_ending(self) -> None:
         """Send SIGTERM to a stage once the one before has ended or taken too long; kill processes that remain."""
-        now = self._clock()
+        now = time.monotonic_ns()
         if self._stage < 0 or now < self._asked_ns:
             return
         alive = [(place.post, place.child) for place in self._places if place.child is not None]

@@ -72,7 +72,7 @@ class Supervised:
 
     def __init__(self, *posts: ProcessSpec, restart: bool = True) -> None:
         self.heard, self._stop = Heard(), threading.Event()
-        self.supervisor = Supervisor(posts, self.heard, restart=restart)
+        self.supervisor = Supervisor(posts, self.heard.heard, self.heard.complained, self.heard.died, restart=restart)
         self._thread = threading.Thread(target=self.supervisor.run, args=(self._stop.is_set,))
 
     def __enter__(self):
@@ -188,10 +188,9 @@ def test_children_end_with_a_watcher_that_is_killed(tmp_path):
     """SIGKILL lets nobody clean up: the children notice by themselves."""
     watcher = (
         f"from automax_ros.cli.run.supervisor import ProcessSpec, Supervisor\nchild = {program(WAITS)!r}\n"
-        "class Heard:\n"
-        "    def heard(self, name, told): print(name, told.text, supervisor.pids[name], flush=True)\n"
-        "    complained = died = print\n"
-        "supervisor = Supervisor([ProcessSpec('one', child), ProcessSpec('two', child)], Heard())\n"
+        "def show(name, told): print(name, told.text, supervisor.pids[name], flush=True)\n"
+        "specs = [ProcessSpec('one', child), ProcessSpec('two', child)]\n"
+        "supervisor = Supervisor(specs, show, print, print)\n"
         "supervisor.run(lambda: False)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", watcher], stdout=subprocess.PIPE, text=True)
