@@ -55,20 +55,13 @@ def figure_of(traces: Traces, layout: Layout) -> Any:
     Raises:
         UsageError: matplotlib is missing.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise UsageError("a picture needs matplotlib", "pip install matplotlib, or `make setup`") from error
     analog = _lanes([line for line in traces.lines if line.variable.kind is not DataType.BOOLEAN], layout.separate)
     logic = [line for line in traces.lines if line.variable.kind is DataType.BOOLEAN]
     tasks = list(dict.fromkeys(mark.task for mark in traces.errors))
     heights = [_ANALOG_IN] * len(analog)
     heights += [_ROW_IN * (len(rows) + 0.5) for rows in (logic, tasks) if rows]
     needed = min(_HIGHEST_IN, _HEAD_IN + sum(heights))
-    size = (layout.width_px / DPI, layout.height_px / DPI or needed)
-    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(layout.width_px / DPI, layout.height_px / DPI or needed)
     axes: Any = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
     for axis, lines in zip(axes, analog, strict=False):
         _draw_analog(axis, lines, traces, layout.width_px)
@@ -80,19 +73,45 @@ def figure_of(traces: Traces, layout: Layout) -> Any:
     axes[-1].set_xlabel("time from the start of the run, s", fontsize=9)
     axes[-1].set_xlim(traces.start_s, traces.end_s if traces.end_s > traces.start_s else traces.start_s + 1e-3)
     axes[-1].ticklabel_format(axis="x", useOffset=False)
-    figure.suptitle(_plain(layout.title), fontsize=11)
+    figure.suptitle(plain(layout.title), fontsize=11)
     figure.align_ylabels(axes[: len(analog)])
     return figure
 
 
-def save(figure: Any, path: Path) -> None:
+def require_matplotlib(what: str = "a picture") -> tuple[Any, Any]:
+    """Return matplotlib's classes of figures and of canvases.
+
+    Raises:
+        UsageError: matplotlib is missing, which ``what`` needs.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise UsageError(f"{what} needs matplotlib", "pip install matplotlib, or `make setup`") from error
+    return Figure, FigureCanvasAgg
+
+
+def new_figure(width: float, height: float, dpi: int = DPI, what: str = "a picture") -> Any:
+    """Return an empty matplotlib figure, its size in inches.
+
+    Raises:
+        UsageError: matplotlib is missing, which ``what`` needs.
+    """
+    figure_class, canvas_class = require_matplotlib(what)
+    figure = figure_class(figsize=(width, height), dpi=dpi, layout="constrained")
+    canvas_class(figure)
+    return figure
+
+
+def save(figure: Any, path: Path, dpi: int = DPI) -> None:
     """Write the figure in the format of the suffix. The same figure gives the same bytes.
 
     Raises:
         UsageError: the file cannot be written.
     """
     with _writing(path) as place:
-        _draw_into(figure, place, path.suffix.lower().lstrip("."))
+        _draw_into(figure, place, path.suffix.lower().lstrip("."), dpi)
 
 
 def save_picture(picture: bytes, path: Path) -> None:
@@ -121,13 +140,13 @@ def picture_of(figure: Any) -> bytes:
     return stream.getvalue()
 
 
-def _draw_into(figure: Any, place: Path | io.BytesIO, kind: str) -> None:
+def _draw_into(figure: Any, place: Path | io.BytesIO, kind: str, dpi: int = DPI) -> None:
     import matplotlib as mpl
 
     date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
     with mpl.rc_context({"svg.hashsalt": "automax"}), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # characters that the font lacks, lanes too low for their labels
-        figure.savefig(place, dpi=DPI, metadata=date, format=kind)
+        figure.savefig(place, dpi=dpi, metadata=date, format=kind)
 
 
 def _lanes(lines: Sequence[Line], separate: bool) -> list[list[Line]]:
@@ -159,11 +178,11 @@ def _draw_analog(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int
         look = _ROLES.get(line.role, others)
         points = _points(line, traces, width_px)
         drawn += axis.plot(*points, drawstyle="steps-post", gid=line.variable.label, **look)
-    labels = [f" {_plain(line.variable.label)}" for line in lines]  # a name may begin with _, which legends leave out
+    labels = [f" {plain(line.variable.label)}" for line in lines]  # a name may begin with _, which legends leave out
     axis.legend(
         drawn, labels, loc="center left", bbox_to_anchor=(1.005, 0.5), fontsize=9, frameon=False, handlelength=3
     )
-    axis.set_ylabel(_plain(lines[0].variable.unit[:40]), fontsize=9)
+    axis.set_ylabel(plain(lines[0].variable.unit[:40]), fontsize=9)
     axis.tick_params(labelsize=8)
     axis.ticklabel_format(axis="y", useOffset=False)
     if all(line.variable.kind is not DataType.REAL for line in lines):
@@ -232,13 +251,13 @@ def _mark_errors(axes: Sequence[Any], marks: Sequence[ErrorMark]) -> None:
 
 
 def _name_rows(axis: Any, names: Sequence[str]) -> None:
-    axis.set_yticks([-row for row in range(len(names))], [_plain(name) for name in names], fontsize=8)
+    axis.set_yticks([-row for row in range(len(names))], [plain(name) for name in names], fontsize=8)
     axis.set_ylim(-len(names) + 0.4, 0.6)
     axis.tick_params(axis="y", length=0)
     axis.tick_params(axis="x", labelsize=8)
     axis.grid(alpha=0.3, axis="x")
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Return a text that matplotlib draws literally: no formulas, nothing unprintable."""
     return printable(text).replace("$", r"\$")

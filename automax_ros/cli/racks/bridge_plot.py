@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from automax_ros.cli.output.figure import new_figure
 from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.user_error import UsageError
 from automax_ros.drive.circuit.scr import FORWARD, PHASES, REVERSE, phase_of
@@ -19,14 +20,8 @@ def plot(case: BridgeCase, state: SteadyState, path: Path) -> None:
     Raises:
         UsageError: matplotlib is missing, or the file cannot be written.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise UsageError("--plot needs matplotlib", "pip install matplotlib, or `make setup`") from error
+    figure = new_figure(10, 9, dpi=100, what="--plot")
     moments = list(waveforms(case, state))
-    figure = Figure(figsize=(10, 9), layout="constrained")
-    FigureCanvasAgg(figure)
     axes: Any = figure.subplots(4, 1, sharex=True, height_ratios=(3, 2, 1.4, 1.4))
     time_ms = [moment.time_s * 1e3 for moment in moments]
     _draw_voltages(axes[0], time_ms, moments, case)
@@ -79,7 +74,6 @@ def _draw_current(axis: Any, time_ms: list[float], moments: list[Moment], state:
 def _draw_bars(
     axis: Any, time_ms: list[float], sets: list[tuple[int, ...]], numbers: tuple[int, ...], label: str
 ) -> None:
-    """Draw a bar wherever an SCR is in the set of the instant."""
     step = time_ms[1] - time_ms[0]
     for row, number in enumerate(numbers):
         bars: list[tuple[float, float]] = []

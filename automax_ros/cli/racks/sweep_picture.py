@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from automax_ros.cli.output.figure import DPI, save
-from automax_ros.core.text import printable
+from automax_ros.cli.output.figure import new_figure, plain, save
 from automax_ros.core.types import Value
-from automax_ros.core.user_error import UsageError
 from automax_ros.sweep.run import Plan
 from automax_ros.sweep.sweeping import Row
 
@@ -27,8 +25,6 @@ _LETTERS_AN_INCH, _LEAST_LETTERS = 14.0, 12
 
 @dataclass(frozen=True)
 class _Axis:
-    """A column of the table as numbers; for texts, the indices in ``texts``."""
-
     label: str
     numbers: list[float]
     texts: tuple[str, ...] = ()
@@ -49,7 +45,7 @@ def draw(plan: Plan, rows: Sequence[Row], best: Sequence[Row], path: Path) -> No
     if not varied:
         return
     measures = [
-        _Axis(item.label, [_number(row.outcome.measures[place]) for row in rows])
+        _Axis(item.label, [math.nan if (value := row.outcome.measures[place]) is None else value for row in rows])
         for place, item in enumerate(plan.measures[:MOST_LANES])
     ]
     marked = [place for place, row in enumerate(rows) if row in best]
@@ -71,24 +67,9 @@ def _axis(label: str, values: Sequence[Value]) -> _Axis:
     return _Axis(label, [float(value) for value in values])
 
 
-def _number(value: float | None) -> float:
-    return math.nan if value is None else value
-
-
-def _figure(rows: int, columns: int, width: float, height: float) -> tuple[Any, Any]:
-    """Return a figure with its axes as an array of rows and columns."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise UsageError("a picture needs matplotlib", "pip install matplotlib, or `make setup`") from error
-    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure, figure.subplots(rows, columns, squeeze=False)
-
-
 def _lines(varied: _Axis, measures: Sequence[_Axis], marked: Sequence[int]) -> Any:
-    figure, axes = _figure(len(measures), 1, _WIDTH_IN, _LANE_IN * len(measures) + 0.5)
+    figure = new_figure(_WIDTH_IN, _LANE_IN * len(measures) + 0.5)
+    axes = figure.subplots(len(measures), 1, squeeze=False)
     order = sorted(range(len(varied.numbers)), key=lambda place: varied.numbers[place])
     for axis, measure in zip(axes[:, 0], measures, strict=True):
         numbers = [varied.numbers[place] for place in order], [measure.numbers[place] for place in order]
@@ -99,7 +80,8 @@ def _lines(varied: _Axis, measures: Sequence[_Axis], marked: Sequence[int]) -> A
 
 
 def _maps(across: _Axis, up: _Axis, measures: Sequence[_Axis], marked: Sequence[int]) -> Any:
-    figure, axes = _figure(len(measures), 1, _WIDTH_IN, _MAP_IN * len(measures))
+    figure = new_figure(_WIDTH_IN, _MAP_IN * len(measures))
+    axes = figure.subplots(len(measures), 1, squeeze=False)
     columns, lines = across.distinct, up.distinct
     for axis, measure in zip(axes[:, 0], measures, strict=True):
         cells = [[math.nan] * len(columns) for _ in lines]
@@ -114,8 +96,8 @@ def _maps(across: _Axis, up: _Axis, measures: Sequence[_Axis], marked: Sequence[
 
 
 def _points(varied: Sequence[_Axis], measures: Sequence[_Axis], marked: Sequence[int]) -> Any:
-    size = max(_WIDTH_IN, _CELL_IN * len(varied)), _CELL_IN * len(measures) + 0.5
-    figure, axes = _figure(len(measures), len(varied), *size)
+    figure = new_figure(max(_WIDTH_IN, _CELL_IN * len(varied)), _CELL_IN * len(measures) + 0.5)
+    axes = figure.subplots(len(measures), len(varied), squeeze=False)
     for line, measure in zip(axes, measures, strict=True):
         for axis, quantity in zip(line, varied, strict=True):
             axis.plot(quantity.numbers, measure.numbers, ".", color=_COLOUR, markersize=3)
@@ -136,7 +118,7 @@ def _name(axis: Any, across: _Axis, up: _Axis) -> None:
     for texts, set_ticks in ((across.texts, axis.set_xticks), (up.texts, axis.set_yticks)):
         if texts:
             every = -(-len(texts) // _MOST_TICKS)
-            set_ticks(range(0, len(texts), every), [_plain(printable(text)) for text in texts[::every]])
+            set_ticks(range(0, len(texts), every), [plain(text) for text in texts[::every]])
     axis.tick_params(labelsize=_FONT)
     axis.grid(alpha=0.3)
 
@@ -144,9 +126,4 @@ def _name(axis: Any, across: _Axis, up: _Axis) -> None:
 def _folded(text: str, inches: float) -> str:
     """Return a label in as many lines as it needs to be no longer than its axis."""
     lines = textwrap.wrap(text, max(_LEAST_LETTERS, int(inches * _LETTERS_AN_INCH)), break_on_hyphens=False)
-    return "\n".join(map(_plain, lines))
-
-
-def _plain(text: str) -> str:
-    """Return a text that matplotlib draws literally, without formulas."""
-    return text.replace("$", r"\$")
+    return "\n".join(map(plain, lines))

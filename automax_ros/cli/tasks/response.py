@@ -68,9 +68,9 @@ def run(arguments: argparse.Namespace) -> int:
     tuning = tuning_of(call, program)
     _require_known(call, tuning)
     if arguments.output is not None:
-        from automax_ros.cli.tasks.response_plot import require_matplotlib
+        from automax_ros.cli.output.figure import require_matplotlib
 
-        require_matplotlib()
+        require_matplotlib("--output")
     response = _measured(arguments, program, call, tuning)
     if arguments.output is not None:
         from automax_ros.cli.tasks.response_plot import plot

@@ -7,8 +7,7 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-from automax_ros.core.safe_file import atomic_write
-from automax_ros.core.user_error import UsageError
+from automax_ros.cli.output.figure import new_figure, save
 from automax_ros.tuning.frequency import decibels, logarithmic
 from automax_ros.tuning.response import BlockResponse, Point, followed
 
@@ -20,43 +19,18 @@ _LOWEST_DB = -100.0
 """Lower gains are drawn at this level."""
 
 
-def require_matplotlib() -> None:
-    """Refuse to begin without matplotlib.
-
-    Raises:
-        UsageError: it is missing.
-    """
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        raise UsageError("--output needs matplotlib", "pip install matplotlib, or `make setup`") from error
-
-
 def plot(response: BlockResponse, path: Path) -> None:
     """Draw a picture into a file.
 
     Raises:
         UsageError: the file cannot be written.
     """
-    import matplotlib
-
-    # Without a date and with fixed names inside, so that the same response gives the same file.
-    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
-    with matplotlib.rc_context({"svg.hashsalt": "automax"}):
-        try:
-            with atomic_write(path) as place:
-                figure_of(response).savefig(place, dpi=130, metadata=metadata)
-        except OSError as error:
-            raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
+    save(figure_of(response), path, dpi=130)
 
 
 def figure_of(response: BlockResponse) -> Any:
     """Return the matplotlib figure: axes for step response, gain and phase."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.5, 10), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(9.5, 10, dpi=100)
     time, gain, phase = figure.subplots(3, 1, height_ratios=(3, 3, 2))
     _draw_step(time, response)
     _draw_bode(gain, phase, response)
@@ -161,7 +135,6 @@ def _draw_points(gain: Any, phase: Any, points: list[Point], label: str, *, reli
 
 
 def _bar(point: Point) -> tuple[float, float]:
-    """Return the uncertainty of a gain downwards and upwards, dB; downwards not beyond the picture."""
     assert point.measured is not None
     size, doubt = abs(point.measured.gain), point.measured.uncertainty
     level = _level(point.measured.gain)
