@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from types import ModuleType
     from typing import NoReturn
 
-    from automax_ros.cli.visible import VisibleOutput
     from automax_ros.ros.setup.arguments import RosArguments
 
 SUBCOMMANDS: dict[str, str] = {
@@ -90,7 +89,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         _open_closed_streams()
         _accept_every_character()
-        output = _make_output_visible()
+        from automax_ros.cli.visible import VisibleOutput
+
+        output = VisibleOutput()
     except KeyboardInterrupt:
         return _interrupted(words)
     try:
@@ -271,12 +272,6 @@ def _accept_every_character() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _make_output_visible() -> VisibleOutput:
-    from automax_ros.cli.visible import VisibleOutput
-
-    return VisibleOutput()
 
 
 def _discard_output() -> None:

@@ -82,11 +82,7 @@ def size_of(rack: RackConfig) -> str:
 
 
 def _meant(path: Path) -> Path:
-    """Return the rack file that an argument names, itself or by its folder.
-
-    Raises:
-        UsageError: the argument is a task, or a folder without a rack file.
-    """
+    """Return the rack file that an argument names, itself or by its folder."""
     if is_task_file(path):
         hint = f"`automax trace {path} --input IN.csv` runs a task alone; `automax new {path.parent}` makes a rack file"
         raise UsageError(f"{path} is a task, and a rack is made of its rack file (.yaml)", hint)

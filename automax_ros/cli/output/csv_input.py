@@ -103,11 +103,7 @@ class CsvTable:
             yield self._line, cells
 
     def _empty_rows(self, lines: range) -> range:
-        """Return the empty lines between two rows, which are rows in a table of one column.
-
-        Raises:
-            CsvFault: the table has more columns.
-        """
+        """Return the empty lines between two rows, which are rows in a table of one column."""
         if lines and len(self.header) > 1:
             raise self.fault(
                 "AMX6914",
@@ -124,7 +120,6 @@ class CsvTable:
         return names
 
     def _next_line(self) -> list[str] | None:
-        """Return the cells of the next line, [] for an empty one, None at the end."""
         try:
             line = self._stream.readline(MAX_LINE + 1)
         except OSError as error:

@@ -11,7 +11,7 @@ import argparse
 import json
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +88,6 @@ def records_of(found: Iterable[DriveFindings]) -> list[dict[str, Any]]:
 
 
 def _execution(case: DriveCase | None) -> dict[str, str | None]:
-    """Return how the current minor loop task is executed, and the model of its Processor; None if there is no task."""
     computing = case.computing if case is not None else None
     if computing is None:
         return {"execution": None, "model": None}
@@ -123,7 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(records_of(found), indent=2))
     else:
         print("\n".join(lines_of(found)))
-    return 1 if wrong or _is_wrong(found) else 0
+    return 1 if wrong or any(item.verdict is Verdict.WRONG for drive in found for item in drive.findings) else 0
 
 
 def _programs(config: RackConfig) -> tuple[list[Program], bool]:
@@ -137,7 +136,3 @@ def _programs(config: RackConfig) -> tuple[list[Program], bool]:
         elif item.result.program is not None:
             programs.append(item.result.program)
     return programs, wrong
-
-
-def _is_wrong(found: Sequence[DriveFindings]) -> bool:
-    return any(item.verdict is Verdict.WRONG for drive in found for item in drive.findings)

@@ -67,7 +67,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _module(text: str) -> tuple[int, str]:
-    """Return the slot and the model number of a module with registers, as --module gives them."""
     match = _MODULE.fullmatch(text)
     if match is None or int(match[1]) > MAX_SLOT:
         raise UsageError(f"--module {quoted(text)} is not a slot and a module", "for example --module 5=57C419")

@@ -97,7 +97,6 @@ def _write(path: Path, text: str) -> None:
 
 
 def _what_to_do(arguments: argparse.Namespace, enclaves: Sequence[Enclave], domain: int) -> list[str]:
-    """Return what was written, and the next commands to run."""
     folder = arguments.output
     lines = [f"{folder / POLICY}: {', '.join(enclave.path for enclave in enclaves)}"]
     if not arguments.keystore:

@@ -119,8 +119,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class _Sweep:
-    """A sweep to be carried out; ``wanted`` determines its output."""
-
     plan: Plan
     points: list[Point]
     where: Workers
@@ -243,11 +241,7 @@ def _points(varied: list[Varied], arguments: argparse.Namespace) -> list[Point]:
 
 
 def _read(option: str, read: Callable[[], _T]) -> _T:
-    """Return the value of an option, which ``read`` parses.
-
-    Raises:
-        UsageError: the option is wrong.
-    """
+    """Return the value of an option, which ``read`` parses."""
     try:
         return read()
     except UserError as fault:

@@ -63,8 +63,8 @@ def as_data(info: BagInfo, facts: dict[str, TaskFacts], *, checked: bool) -> dic
         ],
         "rack": table.rack if table else None,
         "run_id": f"{table.run_id:016x}" if table else None,
-        "clock": _clock(info),
-        "run_s": _run_s(info),
+        "clock": None if table is None else "wall" if table.stamp >= _WALL_CLOCK_NS else "simulated",
+        "run_s": [(stamp - table.stamp) / NS_PER_S for stamp in (info.first_stamp, info.last_stamp)] if table else None,
         "stamps_ns": [info.first_stamp, info.last_stamp] if info.messages else [None, None],
         "start": _time_of_day(info.first_stamp),
         "end": _time_of_day(info.last_stamp),
@@ -151,19 +151,6 @@ def _writer_word(number: int) -> str:
         return WriterKind(number).name.lower()
     except ValueError:
         return f"kind {number}"
-
-
-def _clock(info: BagInfo) -> str | None:
-    if info.table is None:
-        return None
-    return "wall" if info.table.stamp >= _WALL_CLOCK_NS else "simulated"
-
-
-def _run_s(info: BagInfo) -> list[float] | None:
-    """Return begin and end of the recorded part, in seconds from the start of the run."""
-    if info.table is None:
-        return None
-    return [(stamp - info.table.stamp) / NS_PER_S for stamp in (info.first_stamp, info.last_stamp)]
 
 
 def _time_of_day(stamp: int) -> str | None:

@@ -153,7 +153,6 @@ def _seconds(value: float) -> str:
 
 
 def _size(count: int) -> str:
-    """Return a number of bytes with a suitable unit."""
     value, units = float(count), ["bytes", "KiB", "MiB", "GiB", "TiB"]
     while value >= 1024 and len(units) > 1:
         value /= 1024

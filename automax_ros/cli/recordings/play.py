@@ -109,11 +109,7 @@ def _play(
 
 @contextmanager
 def _locks(found: PlayableRecording, renaming: Renaming, domain: int) -> Iterator[None]:
-    """Lock the names of these racks on this host while the block lasts.
-
-    Raises:
-        UsageError: a rack of one of the names runs, or a name cannot be locked.
-    """
+    """Lock the names of these racks on this host while the block lasts."""
     from contextlib import ExitStack
 
     from automax_ros.ros.setup.lock import InstanceLock, LockError, RackAlreadyRuns
@@ -135,8 +131,6 @@ _LIVE_HINT = "stop it, play elsewhere with --namespace, or mix both with --force
 
 
 class _Show:
-    """Makes one playback and shows its progress."""
-
     def __init__(self, found: PlayableRecording, player: Player, stop: StopRequest, domain: int) -> None:
         self._found, self._player, self._stop, self._domain = found, player, stop, domain
         self._line = StatusLine()

@@ -62,7 +62,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _size(text: str) -> tuple[int, int]:
-    """Return width and height from a text such as ``1600x900``."""
     width, cross, height = text.lower().partition("x")
     if cross and (width + height).isdecimal() and text.isascii() and len(text) < 12:
         size = int(width), int(height)

@@ -103,16 +103,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Storing:
-    """Storage options of the recording, and the tasks named by ``--tasks``."""
-
     storage: StorageOptions
     split_ns: int
     tasks: str | None
 
 
 class _Session:
-    """Makes one recording and shows its progress."""
-
     def __init__(self, recorder: LiveRecorder, space: str, domain: int, stop: StopRequest) -> None:
         self._recorder, self._space, self._domain, self._stop = recorder, space, domain, stop
         self._line = StatusLine()
@@ -151,7 +147,6 @@ class _Session:
         return self._summary(recording, folder)
 
     def _found(self, wait_ns: int) -> VariableTable | None:
-        """Wait for the rack; None if a signal comes first."""
         try:
             table = self._recorder.find(wait_ns, lambda: self._stop.requested)
         except CdrError as error:
@@ -171,7 +166,6 @@ class _Session:
         )
 
     def _files(self, own: list[RackFile]) -> list[RackFile]:
-        """Return the files that run, as the rack offers them, else those of the given YAML file."""
         try:
             offered = self._recorder.files(lambda: self._stop.requested)
         except RackFilesError as error:
@@ -300,7 +294,6 @@ def _tasks(table: VariableTable) -> list[str]:
 
 
 def _chosen(table: VariableTable, text: str | None) -> set[str] | None:
-    """Return the tasks to record, None for all."""
     if text is None:
         return None
     known = _tasks(table)

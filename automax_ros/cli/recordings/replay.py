@@ -99,7 +99,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _replayed(replay: Replay, where: Workers, arguments: argparse.Namespace) -> ReplayReport:
-    """Replay, print the report, draw the picture."""
     for source, diagnostics in replay.warnings:
         tell_warnings([(source, diagnostics)], Path(source.name).name, Path(source.name))
     with share_shown("replay") as show:

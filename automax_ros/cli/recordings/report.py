@@ -117,7 +117,6 @@ def _pictures(report: DriveReport, together: bytes | None) -> dict[str, bytes]:
 
 
 def _together(report: DriveReport) -> Traces:
-    """Return the lines of all drives for one picture, in separate lanes for each drive."""
     all_traces = [report.traces(run, marks) for run, marks in report.drives]
     if len(all_traces) == 1:
         return all_traces[0]

@@ -102,7 +102,7 @@ def plain(text: str) -> str:
 
 def page(report: DriveReport, recording: str, pictures: Mapping[str, bytes]) -> str:
     """Return the page of drives; ``pictures`` are PNG files by drive, ``recording`` is the recording's name."""
-    title = f"{report.rack}: {_words(run.drive.name for run, _ in report.drives)}"
+    title = f"{report.rack}: {', '.join(run.drive.name for run, _ in report.drives)}"
     parts: list[str] = []
     for run, marks in report.drives:
         parts += _drive(run, len(marks.marks) + marks.unmarked, pictures.get(run.drive.name))
@@ -229,7 +229,3 @@ def _notes(run: DriveRun) -> list[str]:
     if not run.plant.messages:
         notes.append("The recording has no messages of the plant.")
     return [f'<p class="note">{plain(text)}</p>' for text in notes]
-
-
-def _words(names: Iterable[str]) -> str:
-    return ", ".join(names)

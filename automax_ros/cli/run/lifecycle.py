@@ -206,7 +206,6 @@ class LifecycleRunner:
 
 
 def _print_fault(fault: Exception) -> None:
-    """Print on standard error why a rack cannot be configured."""
     for source, diagnostics in getattr(fault, "findings", ()):
         print_diagnostics(diagnostics, source, sys.stderr)
     if str(fault):

@@ -143,7 +143,6 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[RackPro
 
 
 def _print_seats(seats: tuple[RackProcess, ...]) -> None:
-    """Print the processes of a rack, each with its modules and why they share it."""
     for seat in seats:
         print(f"{seat.name:18}{' '.join(seat.modules)}")
         for reason in seat.reasons:

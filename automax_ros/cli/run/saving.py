@@ -135,7 +135,6 @@ class SavedState:
 
 
 def _news(restored: Restored, path: Path) -> list[str]:
-    """Return the messages about a restored state."""
     counts = [count_of(restored.commons, "common"), count_of(restored.tunables, "tunable")]
     counts += [count_of(restored.forces, "force")] if restored.forces else []
     told = any((restored.commons, restored.tunables, restored.forces))

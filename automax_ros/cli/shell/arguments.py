@@ -70,7 +70,7 @@ def _inner(action: argparse._SubParsersAction[argparse.ArgumentParser], words: S
 
 
 def _option(action: argparse.Action) -> Option:
-    text = str(action.help) % _values_of(action) if action.help else ""
+    text = str(action.help) % {**vars(action), "prog": "automax"} if action.help else ""
     metavar = action.metavar if isinstance(action.metavar, str) else " ".join(action.metavar or ())
     takes_value = action.nargs != 0
     return Option(
@@ -80,8 +80,3 @@ def _option(action: argparse.Action) -> Option:
         metavar or ("" if not takes_value else action.dest.upper()),
         text,
     )
-
-
-def _values_of(action: argparse.Action) -> dict[str, object]:
-    """Return the values that argparse substitutes in the help of an option."""
-    return {**vars(action), "prog": "automax"}

@@ -112,7 +112,6 @@ SHELLS: dict[str, Callable[[Sequence[Command]], str]] = {"bash": bash, "zsh": zs
 
 
 def _path(command: Command) -> str:
-    """Return the words of a subcommand as the scripts collect them: each with a blank before it."""
     return "".join(f" {word}" for word in command.words)
 
 

@@ -113,11 +113,7 @@ def _naming_convert(source: SourceText, diagnostics: list[Diagnostic]) -> list[D
 
 
 def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
-    """Return the findings in the rack file, then in each of its tasks.
-
-    Raises:
-        UsageError: the rack file itself cannot be read.
-    """
+    """Return the findings in the rack file, then in each of its tasks."""
     # Imported here, so that checking a task alone does not load the reader of racks.
     from automax_ros.cli.options.rack import is_text, load_rack_file, size_of
     from automax_ros.rackfile.checks.cpu_load import late_loops, loads_of
@@ -176,7 +172,6 @@ def _print(findings: list[_Findings], files: int) -> None:
 
 
 def _records(findings: _Findings) -> list[dict[str, object]]:
-    """Return the objects of ``--json`` for one text in the order of their places."""
     marked = [
         dataclasses.replace(item, unconfirmed=any(_overlap(item.span, span) for span, _ in findings.unconfirmed))
         for item in findings.diagnostics

@@ -142,7 +142,6 @@ def _ratio_text(parameters: PulseParameters) -> str:
 
 
 def _table(rows: list[tuple[str, Pair]]) -> list[str]:
-    """Return a table with a column for each number, right-justified."""
     cells = [("", "scan", "PULSE_MULT", "PMUL", "difference")]
     cells += [
         (
@@ -191,8 +190,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Columns:
-    """The names of the two columns, and their positions in a row."""
-
     feedback: str
     feedback_at: int
     reset: str | None
@@ -218,12 +215,7 @@ def _number(option: str, text: str) -> int:
 
 
 def _columns(table: CsvTable, arguments: argparse.Namespace) -> _Columns:
-    """Return the columns that the options choose.
-
-    Raises:
-        UsageError: there is no such column, or there are several candidates.
-        CsvFault: two columns have that name.
-    """
+    """Return the columns that the options choose."""
     names = [name.strip() for name in table.header]
     reset_at = None if arguments.reset is None else _position(table, names, "--reset", arguments.reset)
     if arguments.column is not None:
@@ -261,7 +253,6 @@ def _list(names: list[str]) -> str:
 def _compare(
     comparison: PulseComparison, table: CsvTable, columns: _Columns, output: TextIO | None, bar: ProgressBar
 ) -> None:
-    """Run block and instruction over the table, and write each scan to the output."""
     writer = None if output is None else csv.writer(output, lineterminator="\n")
     if writer is not None:
         writer.writerow(_HEADER)
@@ -274,7 +265,6 @@ def _compare(
 
 
 def _row(comparison: PulseComparison, feedback: int, reset: bool) -> tuple[int, ...]:
-    """Return the last scan as the cells under the output's header."""
     output, total = comparison.output, comparison.total
     return (
         output.scan,
@@ -290,11 +280,7 @@ def _row(comparison: PulseComparison, feedback: int, reset: bool) -> tuple[int, 
 
 
 def _scans(table: CsvTable, columns: _Columns) -> Iterator[tuple[int, bool]]:
-    """Yield feedback and reset of each row.
-
-    Raises:
-        CsvFault: a cell of these columns is not an INTEGER or not a BOOLEAN, or a row is wrong.
-    """
+    """Yield feedback and reset of each row."""
     feedback, reset = 0, False
     for line, cells in table.numbered_rows():
         if cell := cells[columns.feedback_at].strip():

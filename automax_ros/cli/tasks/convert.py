@@ -65,11 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _places(files: list[Path], folder: Path | None) -> dict[Path, Path]:
-    """Return where each converted file is written.
-
-    Raises:
-        UsageError: two files have one name, a file exists already, or the folder is a file.
-    """
+    """Return where each converted file is written."""
     if folder is None:
         return {}
     if folder.exists() and not folder.is_dir():

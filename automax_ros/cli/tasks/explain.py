@@ -37,7 +37,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _problems(text: str) -> list[Problem]:
-    """Return the problem with a code, or those that the hardware reports with this code."""
     asked = text.strip().upper()
     match = _CODE.fullmatch(asked)
     problem = PROBLEMS.get(f"AMX{match[1]}") if match else None
@@ -50,7 +49,6 @@ def _problems(text: str) -> list[Problem]:
 
 
 def _near(asked: str, number: int | None) -> str:
-    """Return the hint for an unknown code: the nearest numbers, or the problems whose titles contain the word."""
     if number is not None:
         nearest = sorted(PROBLEMS.values(), key=lambda item: (abs(item.number - number), item.number))[:_NEAR]
     else:
@@ -66,7 +64,6 @@ def _line(problem: Problem) -> str:
 
 
 def _page(problem: Problem, *, colour: bool) -> str:
-    """Return a page without its Markdown: headings as plain lines, fenced blocks indented."""
     text = (
         resources.files("automax_ros.core").joinpath("pages").joinpath(f"{problem.code}.md").read_text(encoding="utf-8")
     )

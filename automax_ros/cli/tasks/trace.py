@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
@@ -119,14 +119,14 @@ def _expected_ns(arguments: argparse.Namespace, period_ns: int) -> int:
 
 
 class _Trace:
-    """One run of a task over a table."""
-
     def __init__(
         self, lone: StandaloneTask, watched: Sequence[LoneVariable], output: TextIO, errors: TextIO | None
     ) -> None:
         """Write the headers and put the task into RUN."""
         self._lone = lone
-        self._cells = [(item.read, _text_of(item.symbol.type)) for item in watched]
+        self._cells = [
+            (item.read, printable if item.symbol.type is DataType.STRING else value_text) for item in watched
+        ]
         self._output = csv.writer(output, lineterminator="\n")
         self._output.writerow(["scan", "time_s", *(item.label for item in watched)])
         self._errors = csv.writer(errors, lineterminator="\n") if errors is not None else None
@@ -157,7 +157,6 @@ class _Trace:
         return self._lone.task.status is Status.RUNNING
 
     def _show_printed(self) -> None:
-        """Print the lines of PRINT statements on standard error, apart from the table."""
         task = self._lone.task
         while task.printed:
             print(f"{task.name}: {printable(task.printed.popleft())}", file=sys.stderr)
@@ -168,10 +167,6 @@ class _Trace:
         for line, code in record.errors:
             entry = LogEntry(line, code, record.scan)
             self._errors.writerow([str(entry.scan), str(entry.line), entry.problem, PROBLEMS[entry.problem].title])
-
-
-def _text_of(kind: DataType) -> Callable[..., str]:
-    return printable if kind is DataType.STRING else value_text
 
 
 def _watched(lone: StandaloneTask, names: list[str] | None) -> list[LoneVariable]:
@@ -185,7 +180,6 @@ def _watched(lone: StandaloneTask, names: list[str] | None) -> list[LoneVariable
 
 
 def _conclusion(lone: StandaloneTask, *, all_told: bool) -> int:
-    """Print on standard error how the trace ended and errors that were not written, and return the exit code."""
     task, log = lone.task, lone.task.errors
     if log.first is not None and not all_told:
         first = f"the first: {log.first.describe()}" if log.count > 1 else log.first.describe()

@@ -45,7 +45,8 @@ class InputTable(CsvTable):
         self._period_ns = task.task.period_ns
         try:
             self.columns = self._columns(task)
-            self._time = self._time_column()
+            names = [name.strip() for name in self.header]
+            self._time = names.index(_TIME) if _TIME in names and _SCAN not in names else None
         except BaseException:
             self.close()
             raise
@@ -88,10 +89,6 @@ class InputTable(CsvTable):
         commons = (item.name for item in task.program.symbols.values() if item.scope is Scope.COMMON)
         return [name for name in commons if name not in given and name not in written]
 
-    def _time_column(self) -> int | None:
-        names = [name.strip() for name in self.header]
-        return names.index(_TIME) if _TIME in names and _SCAN not in names else None
-
     def _time_of(self, cell: str, line: int) -> int:
         text = cell.strip().replace(",", ".")
         if is_number(text) and 0 <= (seconds := Decimal(text)) <= _LATEST_S:
@@ -125,7 +122,6 @@ class InputTable(CsvTable):
         return list(columns.values())
 
     def _set(self, variable: LoneVariable, cell: str, line: int) -> None:
-        """Set a variable to the value of a cell, on a line of the table."""
         symbol = variable.symbol
         text = cell if symbol.type is DataType.STRING else cell.strip()
         if not text:
