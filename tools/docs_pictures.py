@@ -13,7 +13,7 @@ from html import escape
 from pathlib import Path
 
 from automax_ros.cli.main import main
-from automax_ros.cli.run.status import Progress, StatusDisplay, Summary
+from automax_ros.cli.run.status import Progress, StatusDisplay, Summary, TerminalOutput
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
@@ -72,12 +72,12 @@ def status_lines() -> list[str]:
     return ["  ".join(part for part in parts if not part.endswith("x")) for parts in shown.lines]
 
 
-class _Shown:
+class _Shown(TerminalOutput):
     """A screen that stores the lines shown on it; the next line is always due."""
 
-    began_ns = 0
-
     def __init__(self) -> None:
+        super().__init__()
+        self.began_ns = 0
         self.lines: list[list[str]] = []
 
     def due(self) -> int:

@@ -346,8 +346,9 @@ context.init(args=[])
 node = Node("reader", context=context)
 source = RawSubscription(node, "/types/scans", TopicKind("automax_msgs/msg/Scan", SCAN))
 print("up", flush=True)
-last, is_known = {}, False
-while not is_known or node.count_publishers("/types/scans"):
+last, is_known, is_there = {}, False, True
+while not is_known or is_there:
+    is_there = node.count_publishers("/types/scans") > 0  # before the last look at what has come
     for found in source.taken():
         head = scan_head(found.payload)
         is_known = is_known or print("receives", flush=True) is None

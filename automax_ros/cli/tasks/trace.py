@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
@@ -31,7 +31,7 @@ from automax_ros.core.names import NameFault
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import seconds_text
-from automax_ros.core.types import DataType
+from automax_ros.core.types import DataType, Value
 from automax_ros.core.user_error import UsageError
 from automax_ros.core.values import value_text
 from automax_ros.runtime.scan.error_log import LogEntry
@@ -124,7 +124,7 @@ class _Trace:
     ) -> None:
         """Write the headers and put the task into RUN."""
         self._lone = lone
-        self._cells = [
+        self._cells: list[tuple[Callable[[], Value], Callable[..., str]]] = [
             (item.read, printable if item.symbol.type is DataType.STRING else value_text) for item in watched
         ]
         self._output = csv.writer(output, lineterminator="\n")

@@ -48,7 +48,7 @@ class ScanColumns:
     def part(self, begin: int, end: int) -> ScanColumns:
         """Return the scans from ``begin`` to before ``end``."""
         columns: list[Any] = list(vars(self).values())
-        parts = [item.part(begin, end) if isinstance(item, Entries) else item[begin:end] for item in columns]
+        parts: list[Any] = [item.part(begin, end) if isinstance(item, Entries) else item[begin:end] for item in columns]
         return ScanColumns(*parts)
 
 
