@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from automax_ros.parallel.installation import Installation, installation
-from automax_ros.parallel.job import MOST_TRIES, ClusterFault, Job, JobResult, PieceFault, death_of, fault_of, result_of
+from automax_ros.parallel.job import MOST_TRIES, ClusterFault, Job, JobFault, JobResult, death_of, fault_of, result_of
 
 _T = TypeVar("_T")
 CONNECT_S = 10
@@ -112,7 +112,7 @@ class Refusal:
     deaths: tuple[str, ...] = ()
 
 
-Answer = tuple[Any, PieceFault | None]
+Answer = tuple[Any, JobFault | None]
 """The result of a piece, or its fault."""
 
 
@@ -152,7 +152,7 @@ def _answer(piece: Job, worker: str) -> Answer:
 def on_cluster(
     pieces: Sequence[Job], scheduler: str, take: Callable[[int, JobResult], None], should_stop: Callable[[], bool]
 ) -> None:
-    """Do pieces by a cluster; the arguments and the end are those of ``run_pieces``.
+    """Do pieces by a cluster; the arguments and the end are those of ``run_jobs``.
 
     Dask itself restarts a piece whose worker is lost, and may do a piece twice; ``take`` gets the first result.
 
@@ -287,7 +287,7 @@ def _other_machine(worker: str, found: Installation, own: Installation) -> str:
     )
 
 
-def _fault(piece: Job, error: Exception) -> PieceFault:
+def _fault(piece: Job, error: Exception) -> JobFault:
     """Return the fault of a piece for which Dask returned an error instead of an outcome."""
     if type(error).__name__ == "KilledWorker":
         return death_of(piece.name, "its workers have died")

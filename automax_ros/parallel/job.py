@@ -28,7 +28,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class PieceFault:
+class JobFault:
     """Why a piece has no result: the piece's name, the error of its work with its kind, and the worker it came from.
 
     ``died``: there was no report, because each worker that started it has died. ``trace`` is for developers.
@@ -52,7 +52,7 @@ class JobResult:
 
     piece: Job
     result: Any | None = None
-    fault: PieceFault | None = None
+    fault: JobFault | None = None
 
 
 @dataclass(frozen=True)
@@ -80,15 +80,15 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def fault_of(name: str, error: Exception, worker: str = "") -> PieceFault:
+def fault_of(name: str, error: Exception, worker: str = "") -> JobFault:
     """Return the fault of a piece whose work raised an error."""
     trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
-    return PieceFault(name, type(error).__name__, str(error), worker, trace)
+    return JobFault(name, type(error).__name__, str(error), worker, trace)
 
 
-def death_of(name: str, what: str, worker: str = "") -> PieceFault:
+def death_of(name: str, what: str, worker: str = "") -> JobFault:
     """Return the fault of a piece whose workers died as often as it may be tried."""
-    return PieceFault(name, "WorkerDied", f"{what}, {MOST_TRIES} times; it is not tried again", worker, died=True)
+    return JobFault(name, "WorkerDied", f"{what}, {MOST_TRIES} times; it is not tried again", worker, died=True)
 
 
 def result_of(piece: Job, worker: str = "") -> JobResult:

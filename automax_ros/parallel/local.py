@@ -27,7 +27,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NoReturn
 
-from automax_ros.parallel.job import MOST_TRIES, Job, JobResult, PieceFault, death_of, fault_of, result_of
+from automax_ros.parallel.job import MOST_TRIES, Job, JobFault, JobResult, death_of, fault_of, result_of
 
 _THREADS = Path("/proc/self/task")
 """A folder with a name for each thread of this process; without it, processes are fresh interpreters."""
@@ -118,7 +118,7 @@ def _work_and_end(end: Connection, ours: Iterable[Connection], held: Iterable[in
 def in_processes(
     pieces: Sequence[Job], count: int, take: Callable[[int, JobResult], None], should_stop: Callable[[], bool]
 ) -> None:
-    """Do pieces by ``count`` processes; the arguments and the end are those of ``run_pieces``."""
+    """Do pieces by ``count`` processes; the arguments and the end are those of ``run_jobs``."""
     todo = deque((number, 1) for number in range(len(pieces)))
     workers: dict[Connection, _Worker] = {}
     try:
@@ -185,9 +185,9 @@ class _Worker:
         with contextlib.suppress(OSError):
             self.end.send_bytes(payload)
 
-    def answer(self) -> tuple[object, PieceFault | None]:
+    def answer(self) -> tuple[object, JobFault | None]:
         """Return the result and the fault of the piece; EOFError or OSError: the process has died."""
-        answer: tuple[object, PieceFault | None] = pickle.loads(self.end.recv_bytes())
+        answer: tuple[object, JobFault | None] = pickle.loads(self.end.recv_bytes())
         return answer
 
     def kill(self) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from automax_ros.parallel.job import Job, JobResult, Workers, result_of
 
 
-def run_pieces(
+def run_jobs(
     pieces: Sequence[Job],
     where: Workers,
     on_done: Callable[[JobResult], None] = lambda _: None,

@@ -106,7 +106,7 @@ class Rack:
             execution=self._execution if execution is None else lambda _: execution,
             after=ScanEnd(self.observers, self.inputs, self._stop_all).ended,
             no_event=self._no_event,
-            tell_writes=self.observers.tell_writes,
+            report_writes=self.observers.report_writes,
             stopwatch=stopwatch,
         )
         self.modules: list[Module] = [build_module(module, services) for module in self.part.modules]
@@ -215,7 +215,7 @@ class Rack:
         self.memory.now_ns = self.now_ns
         begin_memory(self.config, self.inputs, self.memory)
         self.operations.write_status()
-        self.observers.tell_writes()
+        self.observers.report_writes()
         catch_up()
         self.operations.start(joining=True)
         self._begin_plants()
@@ -229,7 +229,7 @@ class Rack:
         for name, value in settings:
             found = common_named(self.config, name)
             self.inputs.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
-        self.observers.tell_writes()
+        self.observers.report_writes()
 
     def run(self, seconds: float) -> None:
         """Advance simulated time."""
@@ -255,7 +255,7 @@ class Rack:
         memory.now_ns = self.now_ns
         for element, value in accepted:
             self.inputs.write(view, element, value, writer)
-        self.observers.tell_writes()
+        self.observers.report_writes()
 
     def force(self, name: str, value: Value, writer: int = OPERATOR_WRITER) -> None:
         """Hold a common, or a task's own variable (``SPEED.COUNT%``), at a value against every write, between scans.
@@ -283,7 +283,7 @@ class Rack:
             raise KeyError(name) from fault
         self.memory.now_ns = self.now_ns
         change(target)
-        self.observers.tell_writes()
+        self.observers.report_writes()
         if isinstance(target, LocalElement):
             self.observers.tuned(target.task, self.now_ns)
 

@@ -36,7 +36,7 @@ _LOOP_SLOTS = {"io_cntl_slot": "fires the gates of", "dig_io_slot": "reads the p
 """The inputs of a current minor loop that name modules, with the action of its task there."""
 
 
-class NoSuchSeat(UserError):
+class NoSuchProcess(UserError):
     """A text names no module of the rack."""
 
 
@@ -78,18 +78,18 @@ def processes_of(config: RackConfig, programs: Iterable[Program] | None = None) 
     return tuple(sorted(found, key=lambda process: (not process.holds_common_memory, process.slots)))
 
 
-def seat_named(seats: Sequence[RackProcess], text: str) -> RackProcess:
+def process_named(seats: Sequence[RackProcess], text: str) -> RackProcess:
     """Return the process of a module, which is named by its slot or by its name, such as ``3`` or ``processor_3``.
 
     Raises:
-        NoSuchSeat: the rack has no such module.
+        NoSuchProcess: the rack has no such module.
     """
     wanted = text.strip().lower()
     for seat in seats:
         if wanted in (seat.name, *seat.modules, *map(str, seat.slots)):
             return seat
     known = [name for seat in seats for name in seat.modules]
-    raise NoSuchSeat(f"the rack has no module {quoted(text)}", near_or_listed(wanted, known))
+    raise NoSuchProcess(f"the rack has no module {quoted(text)}", near_or_listed(wanted, known))
 
 
 class _Bond(NamedTuple):

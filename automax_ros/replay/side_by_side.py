@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from automax_ros.parallel.job import Job, JobResult, Workers
-from automax_ros.parallel.run import run_pieces
+from automax_ros.parallel.run import run_jobs
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.opening import size_of
 from automax_ros.replay.engine import LONGEST_WAIT_NS, Replay
@@ -131,7 +131,7 @@ class _SideBySide:
         """Execute the parts, join their results, and replay the rest in this process."""
         what = packed(self._replay)
         pieces = [Job(self._name(number), replay_part, (what, part)) for number, part in enumerate(self._parts)]
-        run_pieces(pieces, where, self._take, self._is_over)
+        run_jobs(pieces, where, self._take, self._is_over)
         results = [result for number in range(len(pieces)) if (result := self._result(number)) is not None]
         self._replay.native_elsewhere = tuple(text for result in results for text in result.native)
         proven = self._proven()

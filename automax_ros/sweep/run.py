@@ -131,7 +131,7 @@ def _pass(rack: Rack, plan: Plan, stimulation: StimuliPlayer, should_stop: Calla
             if cause is None or cause.is_fault:
                 return
         rack.scheduler.run_until(min(rack.now_ns + _SLICE_NS, plan.duration_ns))
-        rack.observers.tell_writes()
+        rack.observers.report_writes()
 
 
 def _stimulation(rack: Rack, stimuli: Stimuli | None) -> StimuliPlayer:

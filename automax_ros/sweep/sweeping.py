@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from automax_ros.parallel.job import Job, JobResult, Workers
-from automax_ros.parallel.run import run_pieces
+from automax_ros.parallel.run import run_jobs
 from automax_ros.sweep.points import Point
 from automax_ros.sweep.run import Outcome, Plan, run_points
 
@@ -50,7 +50,7 @@ def run_sweep(
 
     if where.scheduler is None:
         plan.blueprint.prepare()
-    found = run_pieces(pieces, where, lambda done: on_rows(rows_of(done)), should_stop)
+    found = run_jobs(pieces, where, lambda done: on_rows(rows_of(done)), should_stop)
     return [row for done in found for row in rows_of(done)]
 
 

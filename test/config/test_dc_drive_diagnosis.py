@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pytest
 
-from automax_ros.drive.plant.faults import values_of, work_on
+from automax_ros.drive.plant.faults import execute_verb, values_of
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 
@@ -90,7 +90,7 @@ def assert_named(folder: Path, point: Point, execution: str = "ideal", model: st
     for _ in range(6):
         rack.run(0.5)
         assert said(rack) == (0, 0), "nothing is broken yet"
-    work_on(rack.plants["MOTOR"], point.verb, values_of(point.verb, point.value))
+    execute_verb(rack.plants["MOTOR"], point.verb, values_of(point.verb, point.value))
     rack.run(3.0)
     lives = rack.value("CML_STATE@")
     assert lives or not point.must_live, point

@@ -4,7 +4,7 @@ from math import radians
 
 from automax_ros.drive.base.nameplate import EXAMPLES, derive
 from automax_ros.drive.circuit.firing import ConstantAlpha
-from automax_ros.drive.plant.faults import values_of, work_on
+from automax_ros.drive.plant.faults import execute_verb, values_of
 from automax_ros.drive.plant.plant import DrivePlant, LoadData, PlantData
 
 MS = 1_000_000
@@ -31,4 +31,4 @@ def fired(plant: DrivePlant, alpha_deg: float, until_ns: int, *, bridge: int = 1
 
 def do(plant: DrivePlant, verb: str, text: str) -> None:
     """Execute a verb on a plant with values from a text."""
-    work_on(plant, verb, values_of(verb, text))
+    execute_verb(plant, verb, values_of(verb, text))

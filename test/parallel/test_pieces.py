@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from automax_ros.parallel.job import MOST_TRIES, Job, Workers, usable_cores
-from automax_ros.parallel.run import run_pieces
+from automax_ros.parallel.run import run_jobs
 from parallel import works
 
 ROOT = Path(__file__).parents[2]
@@ -38,7 +38,7 @@ def wait_until(holds):
 @pytest.mark.parametrize("jobs", [1, 2, 5])
 def test_results_come_in_the_order_of_the_pieces_and_each_is_told_once(jobs):
     told = []
-    done = run_pieces(squares(20), Workers(jobs), told.append)
+    done = run_jobs(squares(20), Workers(jobs), told.append)
     assert [item.result for item in done] == [number**2 for number in range(20)]
     assert [item.piece.name for item in done] == [f"square {number}" for number in range(20)]
     assert sorted(item.piece.name for item in told) == sorted(item.piece.name for item in done)
@@ -46,13 +46,13 @@ def test_results_come_in_the_order_of_the_pieces_and_each_is_told_once(jobs):
 
 
 def test_nothing_is_begun_where_there_is_nothing_to_do():
-    assert run_pieces([], Workers(4)) == []
-    assert run_pieces([], Workers(scheduler="tcp://nobody:1")) == []
+    assert run_jobs([], Workers(4)) == []
+    assert run_jobs([], Workers(scheduler="tcp://nobody:1")) == []
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_an_error_is_the_fault_of_its_piece_alone(jobs):
-    done = run_pieces([Job(f"1/{n}", works.divided, (n,)) for n in (2, 0, 4)], Workers(jobs))
+    done = run_jobs([Job(f"1/{n}", works.divided, (n,)) for n in (2, 0, 4)], Workers(jobs))
     assert [item.result for item in done] == [0.5, None, 0.25]
     fault = done[1].fault
     assert fault is not None
@@ -62,19 +62,19 @@ def test_an_error_is_the_fault_of_its_piece_alone(jobs):
 
 
 def test_two_jobs_are_two_other_processes():
-    found = {item.result for item in run_pieces([Job(str(n), works.own_process, (n,)) for n in range(40)], Workers(2))}
+    found = {item.result for item in run_jobs([Job(str(n), works.own_process, (n,)) for n in range(40)], Workers(2))}
     assert len(found) == 2
     assert os.getpid() not in found
     wait_until(lambda: all(map(is_gone, found)))
 
 
 def test_one_job_is_this_process():
-    (done,) = run_pieces([Job("here", works.own_process, (0,))], Workers(1))
+    (done,) = run_jobs([Job("here", works.own_process, (0,))], Workers(1))
     assert done.result == os.getpid()
 
 
 def test_a_result_that_cannot_be_sent_is_a_fault_of_the_piece():
-    done = run_pieces([Job("odd", works.unlike_any, (0,)), *squares(2)], Workers(2))
+    done = run_jobs([Job("odd", works.unlike_any, (0,)), *squares(2)], Workers(2))
     assert done[0].fault is not None
     assert "pickle" in done[0].fault.message
     assert [item.result for item in done[1:]] == [0, 1]
@@ -83,7 +83,7 @@ def test_a_result_that_cannot_be_sent_is_a_fault_of_the_piece():
 def test_a_worker_that_dies_costs_its_piece_a_second_try_and_no_other_piece_anything(tmp_path):
     pieces = [Job(f"piece {n}", works.killed, (str(tmp_path), n, 1 if n == 3 else 0)) for n in range(8)]
     told = []
-    done = run_pieces(pieces, Workers(2), told.append)
+    done = run_jobs(pieces, Workers(2), told.append)
     assert [item.result for item in done] == list(range(8))
     assert len(told) == 8
     assert [len((tmp_path / str(n)).read_text().split()) for n in range(8)] == [1, 1, 1, 2, 1, 1, 1, 1]
@@ -91,7 +91,7 @@ def test_a_worker_that_dies_costs_its_piece_a_second_try_and_no_other_piece_anyt
 
 def test_a_piece_that_kills_its_workers_is_named_and_not_tried_again(tmp_path):
     pieces = [Job(f"piece {n}", works.killed, (str(tmp_path), n, 99 if n in {0, 3} else 0)) for n in range(5)]
-    done = run_pieces(pieces, Workers(2))
+    done = run_jobs(pieces, Workers(2))
     assert [item.result for item in done] == [None, 1, 2, None, 4]
     for number in (0, 3):
         fault = done[number].fault
@@ -104,14 +104,14 @@ def test_a_piece_that_kills_its_workers_is_named_and_not_tried_again(tmp_path):
 
 def test_what_is_under_way_is_given_up_when_it_shall_stop(tmp_path):
     pieces = [*squares(1), *(Job(f"long {n}", works.long, (str(tmp_path), n)) for n in range(3))]
-    done = run_pieces(pieces, Workers(2), should_stop=lambda: len(list(tmp_path.iterdir())) == 2)
+    done = run_jobs(pieces, Workers(2), should_stop=lambda: len(list(tmp_path.iterdir())) == 2)
     assert [item.result for item in done] == [0]
     assert all(is_gone(int(file.read_text())) for file in tmp_path.iterdir())
 
 
 def test_one_job_stops_between_two_pieces():
     told = []
-    assert len(run_pieces(squares(9), Workers(1), told.append, lambda: len(told) == 4)) == 4
+    assert len(run_jobs(squares(9), Workers(1), told.append, lambda: len(told) == 4)) == 4
 
 
 def test_an_error_of_the_one_who_is_told_ends_all(tmp_path):
@@ -124,7 +124,7 @@ def test_an_error_of_the_one_who_is_told_ends_all(tmp_path):
 
     pieces = [Job("long", works.long, (str(tmp_path), 7)), *squares(3)]
     with pytest.raises(Enough):
-        run_pieces(pieces, Workers(2), told)
+        run_jobs(pieces, Workers(2), told)
     assert is_gone(int((tmp_path / "7").read_text()))
 
 
@@ -137,11 +137,11 @@ PROGRAM = """
 import sys, time
 sys.path.append(sys.argv[2])
 from automax_ros.parallel.job import Job, Workers
-from automax_ros.parallel.run import run_pieces
+from automax_ros.parallel.run import run_jobs
 from parallel import works
 {thread}
 try:
-    run_pieces([Job(str(n), works.long, (sys.argv[1], n)) for n in range(2)], Workers(2))
+    run_jobs([Job(str(n), works.long, (sys.argv[1], n)) for n in range(2)], Workers(2))
 except KeyboardInterrupt:
     print("interrupted")
 """
@@ -175,13 +175,13 @@ COPIED = """
 import atexit, sys, time
 sys.path.append(sys.argv[1])
 from automax_ros.parallel.job import Job, Workers
-from automax_ros.parallel.run import run_pieces
+from automax_ros.parallel.run import run_jobs
 from parallel import works
 works.marks.append(7)
 {thread}
 atexit.register(print, "at its end")
 print("begun")
-print([item.result for item in run_pieces([Job(str(n), works.marked, (n,)) for n in range(4)], Workers(2))])
+print([item.result for item in run_jobs([Job(str(n), works.marked, (n,)) for n in range(4)], Workers(2))])
 """
 
 
@@ -199,7 +199,7 @@ def test_no_module_is_taken_from_the_folder_in_which_a_worker_begins(tmp_path, m
     (tmp_path / "pickle.py").write_text("raise SystemExit(1)")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [item for item in sys.path if item] + [str(ROOT)])
-    assert [item.result for item in run_pieces(squares(3), Workers(2))] == [0, 1, 4]
+    assert [item.result for item in run_jobs(squares(3), Workers(2))] == [0, 1, 4]
 
 
 def test_jobs_are_at_least_one_and_by_default_as_many_as_cores():

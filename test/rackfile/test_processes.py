@@ -14,7 +14,7 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.processes import HOME, NoSuchSeat, _groups, processes_of, seat_named
+from automax_ros.rackfile.processes import HOME, NoSuchProcess, _groups, process_named, processes_of
 
 IDLE = "10 CALL SCAN_LOOP(TICKS=2)\n20 END\n"
 SETS = "10 EVENT NAME=GO\n20 SET GO\n30 STOP\n40 END\n"
@@ -146,14 +146,14 @@ def test_a_reload_that_would_join_processes_is_refused(tmp_path):
 @pytest.mark.parametrize("text", ["3", "processor_3", " PROCESSOR_3 ", "10", "udc_10"])
 def test_a_seat_is_named_by_slot_or_module(text):
     config = loaded(CONFIG / "web_line")
-    assert seat_named(processes_of(config), text).name == "processor_3"
+    assert process_named(processes_of(config), text).name == "processor_3"
 
 
 @pytest.mark.parametrize(("text", "hint"), [("4", None), ("procesor_3", "did you mean processor_3?")])
 def test_a_module_that_is_not_there_is_refused(text, hint):
     config = loaded(CONFIG / "web_line")
-    with pytest.raises(NoSuchSeat) as told:
-        seat_named(processes_of(config), text)
+    with pytest.raises(NoSuchProcess) as told:
+        process_named(processes_of(config), text)
     assert f"no module '{text}'" in told.value.message
     assert hint is None or told.value.hint == hint
 

@@ -13,7 +13,7 @@ from parallel.clusters import cluster
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.parallel.job import JobResult, PieceFault, Workers, result_of
+from automax_ros.parallel.job import JobFault, JobResult, Workers, result_of
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.mcap.metadata import METADATA_FILE
 from automax_ros.recordings.write.recorder import RecordingOptions
@@ -66,7 +66,7 @@ class Here:
             self.passes += 1
             return run(*arguments)
 
-        monkeypatch.setattr(side_by_side, "run_pieces", pieces)
+        monkeypatch.setattr(side_by_side, "run_jobs", pieces)
         monkeypatch.setattr(Replay, "run", whole)
 
 
@@ -342,7 +342,7 @@ def test_a_cluster_finds_the_same_though_a_worker_is_killed(plain, tmp_path):
 
 
 def faulty(fault):
-    """Stands in for ``run_pieces``: one piece has a fault."""
+    """Stands in for ``run_jobs``: one piece has a fault."""
 
     def pieces(wanted, where, on_done, should_stop):
         for number, piece in enumerate(wanted):
@@ -353,16 +353,16 @@ def faulty(fault):
 
 def test_files_that_a_worker_cannot_read_are_named_with_the_worker(monkeypatch, plain):
     """Where they can be read here; else the recording is at fault, and the report is that of one job."""
-    fault = faulty(lambda piece: PieceFault(piece.name, "BagError", "cannot be read", "tcp://10.0.0.2:4000"))
-    monkeypatch.setattr(side_by_side, "run_pieces", fault)
+    fault = faulty(lambda piece: JobFault(piece.name, "BagError", "cannot be read", "tcp://10.0.0.2:4000"))
+    monkeypatch.setattr(side_by_side, "run_jobs", fault)
     with pytest.raises(BagError, match=r"scans_3\.mcap: cannot be read \(on tcp://10\.0\.0\.2:4000\)") as caught:
         replay_side_by_side(prepared(plain), Workers(scheduler="tcp://10.0.0.1:8786"))
     assert caught.value.code == "AMX6856"
 
 
 def test_files_whose_workers_die_are_named(monkeypatch, plain):
-    fault = faulty(lambda piece: PieceFault(piece.name, "WorkerDied", "its process has died", died=True))
-    monkeypatch.setattr(side_by_side, "run_pieces", fault)
+    fault = faulty(lambda piece: JobFault(piece.name, "WorkerDied", "its process has died", died=True))
+    monkeypatch.setattr(side_by_side, "run_jobs", fault)
     with pytest.raises(BagError, match=r"scans_3\.mcap: its process has died") as caught:
         replay_side_by_side(prepared(plain), Workers(2))
     assert caught.value.code == "AMX6855"

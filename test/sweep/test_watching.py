@@ -43,11 +43,11 @@ def test_a_window_sees_what_holds_within_it(
         rack.memory.now_ns = rack.now_ns
         rack.memory.write_now(rack.memory.view("SLOW"), float(value), 1)
         if looks:
-            rack.observers.tell_writes()
+            rack.observers.report_writes()
         held[time:] = value
         before = value if time < start else before
     rack.scheduler.run_until(LENGTH_MS * NS_PER_MS)
-    rack.observers.tell_writes()
+    rack.observers.report_writes()
     v = held[start:end]
     t = np.arange(len(v)) * 1e-3
     step = v[-1] - before

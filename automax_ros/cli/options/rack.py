@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from automax_ros.cli.output.screen import print_diagnostics, tell_warnings
+from automax_ros.cli.output.screen import print_diagnostics, print_warning_count
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import count_of
 from automax_ros.core.types import Value, bare_name
@@ -107,7 +107,7 @@ def config_of(path: Path, *, allow_outside: bool, quiet: bool = False) -> RackCo
     if has_errors(result.diagnostics):
         print_diagnostics(result.diagnostics, result.source, sys.stderr)
     elif not quiet:
-        tell_warnings([(result.source, result.diagnostics)], path.name, path)
+        print_warning_count([(result.source, result.diagnostics)], path.name, path)
     if not is_text(result):
         raise UsageError(f"{path} cannot be used")
     return result.config if not has_errors(result.diagnostics) else None
@@ -123,7 +123,7 @@ def usable_config(path: Path, *, allow_outside: bool) -> RackConfig:
     result = load_rack_file(path, allow_outside=allow_outside)
     if result.config is None:
         raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
-    tell_warnings([(result.source, result.diagnostics)], path.name, path)
+    print_warning_count([(result.source, result.diagnostics)], path.name, path)
     return result.config
 
 

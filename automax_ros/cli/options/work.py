@@ -89,7 +89,7 @@ def native_forms(arguments: argparse.Namespace, expected_ns: int | None, *, wall
     return forms
 
 
-def tell_native(outcomes: Iterable[NativeOutcome]) -> None:
+def print_native(outcomes: Iterable[NativeOutcome]) -> None:
     """Print the outcome for each task on standard error."""
     for outcome in outcomes:
         print(outcome.text, file=sys.stderr)

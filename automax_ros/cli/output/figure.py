@@ -133,7 +133,7 @@ def _writing(path: Path) -> Iterator[Path]:
         raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
-def picture_of(figure: Any) -> bytes:
+def image_of(figure: Any) -> bytes:
     """Return the figure as a PNG file. The same figure gives the same bytes."""
     stream = io.BytesIO()
     _draw_into(figure, stream, "png")

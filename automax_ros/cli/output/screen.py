@@ -48,7 +48,7 @@ def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, str
         write_control(stream, (_painted(item, text) if colour else text) + "\n")
 
 
-def tell_warnings(findings: Iterable[tuple[SourceText, Sequence[Diagnostic]]], of: str, path: Path) -> None:
+def print_warning_count(findings: Iterable[tuple[SourceText, Sequence[Diagnostic]]], of: str, path: Path) -> None:
     """Print on standard error how many warnings there are, and that `automax check` of ``path`` shows them.
 
     A command that is used repeatedly does not print them each time; ``of`` names what they concern.

@@ -19,7 +19,7 @@ from typing import TypeVar
 from automax_ros.cli.options.rack import add_outside_argument, config_of, print_refused
 from automax_ros.cli.options.stimuli import StimuliRefused, stimulation
 from automax_ros.cli.options.values import seconds_above_0, whole_number
-from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, tell_native, where_of
+from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, print_native, where_of
 from automax_ros.cli.output.screen import ProgressBar
 from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
 from automax_ros.cli.racks.sweep_output import Output, Wanted, best_of, prepared, print_best
@@ -168,7 +168,7 @@ def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
     plan = Plan(RackTemplate.of(rack, native), quantities, measures, arguments.duration, stimuli)
     first = _read("--vary", lambda: plan.blueprint.rack(plan.beginning(points[0]).plants))
     if arguments.verbose:
-        tell_native(first.operations.installation.native.values())
+        print_native(first.operations.installation.native.values())
     wanted = Wanted(arguments, rack.installed, measures.index(best), greatest=greatest)
     return _Sweep(plan, points, where, wanted)
 

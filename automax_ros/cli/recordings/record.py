@@ -151,7 +151,7 @@ class _Session:
             table = self._recorder.find(wait_ns, lambda: self._stop.requested)
         except CdrError as error:
             raise UsageError(f"{self._space}/variables is not a rack's table: {error}") from error
-        if not self._recorder.binding.tells_senders:
+        if not self._recorder.binding.knows_senders:
             self._line.message("warning: this ROS 2 does not tell who sends: what others publish is recorded too")
         if table is not None or self._stop.requested:
             return table

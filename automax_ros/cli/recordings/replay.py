@@ -15,7 +15,7 @@ from pathlib import Path
 from automax_ros.cli.options.values import add_window_arguments, option_number, whole_number, window_of
 from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, where_of
 from automax_ros.cli.output.files import require_different_files, require_picture_file
-from automax_ros.cli.output.screen import print_diagnostics, share_shown, tell_warnings
+from automax_ros.cli.output.screen import print_diagnostics, print_warning_count, share_shown
 from automax_ros.cli.output.signals import ended_by_signals
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.user_error import UsageError
@@ -100,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _replayed(replay: Replay, where: Workers, arguments: argparse.Namespace) -> ReplayReport:
     for source, diagnostics in replay.warnings:
-        tell_warnings([(source, diagnostics)], Path(source.name).name, Path(source.name))
+        print_warning_count([(source, diagnostics)], Path(source.name).name, Path(source.name))
     with share_shown("replay") as show:
         notes: list[str] = []
         report = replay_side_by_side(replay, where, show, notes.append)

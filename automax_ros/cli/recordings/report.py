@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from automax_ros.cli.options.values import add_window_arguments, window_of
-from automax_ros.cli.output.figure import Layout, figure_of, picture_of, save_picture
+from automax_ros.cli.output.figure import Layout, figure_of, image_of, save_picture
 from automax_ros.cli.output.files import require_different_files, require_writable, write_text
 from automax_ros.cli.output.screen import print_diagnostics, share_shown
 from automax_ros.cli.output.signals import ended_by_signals
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     shown = _together(report) if whole is None else whole.traces
     picture = None
     if shown.lines and (png is not None or len(report.drives) < 2):
-        picture = picture_of(figure_of(shown, Layout(f"{report.rack[:80]}: {name[:80]}", _WIDTH_PX)))
+        picture = image_of(figure_of(shown, Layout(f"{report.rack[:80]}: {name[:80]}", _WIDTH_PX)))
     if output is not None:
         text = page(report, name, _pictures(report, picture)) if whole is None else rack_page(whole, name, picture)
         write_text(output, text)
@@ -112,7 +112,7 @@ def _pictures(report: DriveReport, together: bytes | None) -> dict[str, bytes]:
     for run, marks in report.drives:
         traces = report.traces(run, marks)
         if traces.lines:
-            found[run.drive.name] = picture_of(figure_of(traces, Layout(run.drive.name, _WIDTH_PX)))
+            found[run.drive.name] = image_of(figure_of(traces, Layout(run.drive.name, _WIDTH_PX)))
     return found
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from automax_ros.cli.options.rack import begin_with
 from automax_ros.cli.options.stimuli import stimulation as stimulation_of
 from automax_ros.cli.output.signals import StopRequest
-from automax_ros.cli.run.plan import RunPlan, conclude, report_at_end, tell_forms, warn
+from automax_ros.cli.run.plan import RunPlan, conclude, print_forms, report_at_end, warn
 from automax_ros.cli.run.saving import DiskSync, RecordingMonitor, SavedState
 from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_S
@@ -55,7 +55,7 @@ class LiveSession:
             self.rack = rack = Rack(plan.config, stopwatch=time.monotonic_ns, local=plan.slots, native=plan.native)
             if not plan.is_watched:
                 warn(rack)
-            tell_forms(rack, plan)
+            print_forms(rack, plan)
             self._stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
         self._state = SavedState(rack, plan.state_folder)
         self._operated = OperationLog(lambda: self._stimulation.is_acting)

@@ -27,7 +27,7 @@ from automax_ros.core.user_error import UsageError
 from automax_ros.rack.operator.retention import RetentionFault
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.processes import RackProcess, processes_of, seat_named
+from automax_ros.rackfile.processes import RackProcess, process_named, processes_of
 from automax_ros.recordings.write.recorder import RecordingOptions
 
 _MOST_ID = (1 << 63) - 1
@@ -108,7 +108,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[RackProcess, ...], stop: StopRequest) -> int:
-    seat = seat_named(seats, arguments.module)
+    seat = process_named(seats, arguments.module)
     if arguments.settings and not seat.holds_common_memory:
         raise UsageError("--set belongs to the process of common memory", "give it to `--module common_memory`")
     ros = ros_arguments(arguments)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from automax_ros.cli.options.work import tell_native
+from automax_ros.cli.options.work import print_native
 from automax_ros.cli.output.files import write_report
-from automax_ros.cli.output.screen import tell_warnings
-from automax_ros.cli.run.process_messages import ProcessOutput, tell_report
+from automax_ros.cli.output.screen import print_warning_count
+from automax_ros.cli.run.process_messages import ProcessOutput, send_report
 from automax_ros.cli.run.status import TerminalOutput
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.types import Value
@@ -114,13 +114,13 @@ class RunPlan:
 
 def warn(rack: Rack) -> None:
     """Print how many warnings the checks of the tasks gave."""
-    tell_warnings(rack.warnings, "its tasks", rack.config.path)
+    print_warning_count(rack.warnings, "its tasks", rack.config.path)
 
 
-def tell_forms(rack: Rack, plan: RunPlan) -> None:
+def print_forms(rack: Rack, plan: RunPlan) -> None:
     """Print which tasks are native, and why others are not, if the plan asks for it."""
     if plan.verbose:
-        tell_native(rack.operations.installation.native.values())
+        print_native(rack.operations.installation.native.values())
 
 
 def report_at_end(rack: Rack, stimulation: StimuliPlayer, others: Sequence[OperationRecord] = ()) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def conclude(rack: Rack, plan: RunPlan, report: dict[str, Any] | None, *, failed
         write_report(plan.report, report)
     stopped = rack.operations.stopped
     if plan.is_watched:
-        tell_report(report or {})
+        send_report(report or {})
     elif stopped is not None:
         print(f"automax run: STOP ALL: {stopped.reason}", file=sys.stderr)
     fault = stopped is not None and stopped.is_fault

@@ -55,7 +55,7 @@ class ProcessOutput(TerminalOutput):
         _tell("summary", dataclasses.asdict(summary))
 
 
-def tell_report(report: Mapping[str, Any]) -> None:
+def send_report(report: Mapping[str, Any]) -> None:
     """Send this process's part of the report, by which it announces a clean end."""
     _tell("report", report)
 

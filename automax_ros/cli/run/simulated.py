@@ -5,7 +5,7 @@ from __future__ import annotations
 from automax_ros.cli.options.rack import begin_with
 from automax_ros.cli.options.stimuli import stimulation as stimulation_of
 from automax_ros.cli.output.signals import StopRequest
-from automax_ros.cli.run.plan import RunPlan, conclude, report_at_end, tell_forms, warn
+from automax_ros.cli.run.plan import RunPlan, conclude, print_forms, report_at_end, warn
 from automax_ros.cli.run.saving import RecordingMonitor, SavedState
 from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_MS
@@ -29,7 +29,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     with stop.cut_short():
         rack = Rack(plan.config, native=plan.native)
         warn(rack)
-        tell_forms(rack, plan)
+        print_forms(rack, plan)
         stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, plan.record, plan.recording) if plan.record is not None else None

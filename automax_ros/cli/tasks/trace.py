@@ -23,7 +23,7 @@ from typing import TextIO
 from automax_ros.cli.options.stimuli import StimuliRefused, entries_of
 from automax_ros.cli.options.task import add_target_arguments, check_task_file, require_clock, target_of
 from automax_ros.cli.options.values import add_watch_argument, seconds_above_0, watch_list
-from automax_ros.cli.options.work import add_native_arguments, native_forms, tell_native
+from automax_ros.cli.options.work import add_native_arguments, native_forms, print_native
 from automax_ros.cli.output.files import opened_for_writing, require_different_files
 from automax_ros.cli.output.screen import ProgressBar, print_diagnostics
 from automax_ros.cli.tasks.trace_rows import InputTable, StimulatedScans
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_clock(arguments.file, result.program)
     lone = StandaloneTask(result.program, native_forms(arguments, _expected_ns(arguments, result.program.period_ns)))
     if arguments.verbose:
-        tell_native([lone.native])
+        print_native([lone.native])
     watched = _watched(lone, watch_list(arguments.watch))
     read = {"FILE": arguments.file, "--input": arguments.input, "--stimuli": arguments.stimuli}
     require_different_files(

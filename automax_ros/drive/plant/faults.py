@@ -120,7 +120,7 @@ def is_over(plant: DrivePlant, text: str) -> bool:
     return verb == SAG and 0 < plant.sag_end_ns <= plant.now_ns
 
 
-def mend_line(plant: DrivePlant) -> None:
+def restore_line(plant: DrivePlant) -> None:
     """Restore a line's usual voltage and frequency, without disturbances; the caller updates the notes."""
     usual = plant.data.parameters
     plant.sync.clear()
@@ -280,7 +280,7 @@ def values_of(verb: str, text: str) -> Numbers:
         raise ParameterError(f"{verb} cannot be {quoted(text)}: it takes {VERBS[verb].wants}") from error
 
 
-def work_on(plant: DrivePlant, verb: str, values: Numbers) -> None:
+def execute_verb(plant: DrivePlant, verb: str, values: Numbers) -> None:
     """Execute a verb at the plant's present.
 
     Raises:
@@ -341,7 +341,7 @@ def _repair(plant: DrivePlant, _: Numbers) -> None:
             circuit.close_phase(_TERMINALS[terminal])
     assert plant.motor.field is not None
     plant.motor.field.voltage = 1.0
-    mend_line(plant)
+    restore_line(plant)
     plant.notes.clear()
 
 

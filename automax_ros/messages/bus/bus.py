@@ -116,7 +116,7 @@ def image_message(picture: ImageCopy, now_ns: int, run_id: int, process: int, as
     return BusImage(now_ns, run_id, process, picture.sequence, asked_by, values_of(values), *columns)
 
 
-def picture_of(message: BusImage, texts: Collection[int]) -> ImageCopy:
+def image_of(message: BusImage, texts: Collection[int]) -> ImageCopy:
     """Return the image in a message; ``texts`` are the views of STRING variables.
 
     Raises:
@@ -136,7 +136,7 @@ def picture_of(message: BusImage, texts: Collection[int]) -> ImageCopy:
     return ImageCopy(message.sequence, held, forces)
 
 
-def standing_of(presence: Presence) -> StopState:
+def stop_state_of(presence: Presence) -> StopState:
     """Return the operating state of the rack in a process's presence."""
     cause = None
     if presence.stopped:
@@ -145,7 +145,7 @@ def standing_of(presence: Presence) -> StopState:
     return StopState(presence.standing_ns, presence.standing_seat, cause)
 
 
-def with_standing(presence: Presence, standing: StopState) -> Presence:
+def with_stop_state(presence: Presence, standing: StopState) -> Presence:
     """Return a process's presence with the operating state of the rack."""
     cause = standing.cause
     return presence._replace(

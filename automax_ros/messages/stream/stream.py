@@ -204,7 +204,7 @@ class RackStream:
     def end(self) -> None:
         """Send values held back by rate limits, what a scan in progress has written so far, and the final states."""
         now = self._rack.now_ns
-        self._rack.observers.tell_writes()
+        self._rack.observers.report_writes()
         for view, value in self._values.items():
             if value.waits:
                 self._send_value(view, value, now)

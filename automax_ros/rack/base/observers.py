@@ -68,7 +68,7 @@ class Observers:
         for observer in self._all:
             observer.scanned(task, record, writes)
 
-    def tell_writes(self) -> None:
+    def report_writes(self) -> None:
         """Report writes that were not made by a scan."""
         writes = self._memory.take_writes()
         if writes:
@@ -82,6 +82,6 @@ class Observers:
 
     def operated(self, operation: Operation) -> None:
         """Report an operation, after the writes that belong to it."""
-        self.tell_writes()
+        self.report_writes()
         for observer in self._all:
             observer.operated(operation)

@@ -286,7 +286,7 @@ class ImageSync:
 
     def _tell(self) -> None:
         self._memory.take_causes()
-        self._rack.observers.tell_writes()
+        self._rack.observers.report_writes()
 
     def _collect(self) -> None:
         causes = self._memory.take_causes()
@@ -338,4 +338,4 @@ class ImageSync:
                 word = merged(int(memory.read_now(item.bank, item.register)), [item])
                 memory.write_now(item.bank, word, PRESET_WRITER, item.register, WriteKind.OUTSIDE)
         memory.take_causes()
-        self._rack.observers.tell_writes()
+        self._rack.observers.report_writes()

@@ -413,4 +413,4 @@ class DriveControllerModule:
             feedback = self._parts.drives.voltage(self.config.slot)
             if feedback is not None:
                 feedback(plant.circuit.armature_v, plant.data.parameters.line_v)
-                self._parts.tell_writes()
+                self._parts.report_writes()

@@ -124,7 +124,7 @@ class IoModule:
             own.show(copy, own.read(source))
         for register, bits in registers.clock_status:
             own.show(register, bits if self._parts.clock.runs else 0)
-        self._parts.tell_writes()
+        self._parts.report_writes()
 
 
 class _PeriodicInterrupt:
@@ -146,7 +146,7 @@ class _PeriodicInterrupt:
 
     def free(self) -> None:
         if self._parts.inputs.free(self._freezer):
-            self._parts.tell_writes()
+            self._parts.report_writes()
 
     def state(self) -> dict[str, object]:
         return {"next_ns": self._parts.scheduler.due_ns(self._event), **self._freezer.state()}
@@ -174,7 +174,7 @@ class _PeriodicInterrupt:
     def _happen(self, now_ns: int, skipped: int) -> None:
         interrupts, inputs = self._parts.interrupts, self._parts.inputs
         inputs.freeze(self._freezer, interrupts.waiting(self._bank, self.status))
-        self._parts.tell_writes()
+        self._parts.report_writes()
         interrupts.post(self._bank, self.status, now_ns, skipped)
 
 

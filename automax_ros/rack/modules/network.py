@@ -104,7 +104,7 @@ class NetworkModule(QuietModule):
                 self._take(sender, frame)
             else:
                 self._count["unreadable"] += 1
-        self._parts.tell_writes()
+        self._parts.report_writes()
 
     def status(self) -> NetworkStatus:
         """Return its status on the network."""
@@ -188,7 +188,7 @@ class NetworkModule(QuietModule):
         if self._sequence % SHOW_EVERY == 0:
             for name, number in _COUNTERS.items():
                 self._write(number, self._count[name])
-        self._parts.tell_writes()
+        self._parts.report_writes()
 
     def _process_depth(self) -> None:
         word = self._read(DEPTH)

@@ -270,7 +270,7 @@ class UdcModule:
         self._missed = present // every - (before + 1) // every if every else 0
         if self._own.read(SCAN_COUNTER) != self._count:
             self._own.show(SCAN_COUNTER, self._count)
-            self._parts.tell_writes()
+            self._parts.report_writes()
         image, (at_every, at_nth) = self._memory.image, self._present_copies
         image.take(at_every.inputs)
         if every and present // every > before // every:
@@ -314,7 +314,7 @@ class UdcModule:
             writer = next(item.task.writer for item in self.tasks if item.name == name)
             self._parts.memory.now_ns = now_ns
             self._memory.image.give(keys, writer)
-            self._parts.tell_writes()
+            self._parts.report_writes()
 
     @property
     def _scans_per_interrupt(self) -> int:

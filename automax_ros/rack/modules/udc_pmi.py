@@ -51,7 +51,7 @@ class UdcPmis:
         for link in self._links:
             link.receive(now_ns)
         if self._links:
-            self._parts.tell_writes()
+            self._parts.report_writes()
 
     def follow(self) -> None:
         """Check the common clock when the present change is complete, still at this instant."""
@@ -92,7 +92,7 @@ class UdcPmis:
         for link in self._links:
             if self._commanded(link.drive):
                 self.show(link.base + table.LINK, table.NO_CLOCK)
-        self._parts.tell_writes()
+        self._parts.report_writes()
 
 
 class _Link:

@@ -409,7 +409,7 @@ class Operations:
         """Restore the forces of an installed task; return the names that it lacks, which are released."""
         self._memory.now_ns = self._scheduler.now_ns
         released = self._forcing.hold_again(item.task, forces, PRESET_WRITER)
-        self._observers.tell_writes()
+        self._observers.report_writes()
         return released
 
     def _tell_released(self, item: ScheduledTask, names: Sequence[str]) -> None:

@@ -190,7 +190,7 @@ class ValueOperations:
             call()
         except MemoryValueError as error:
             self._refuse(what, str(error), task)
-        self._observers.tell_writes()
+        self._observers.report_writes()
 
     def _refuse(self, what: str, reason: str, task: str = "") -> NoReturn:
         if what == _NOT_REPORTED:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from automax_ros.core.text import near_or_listed, printable, quoted
 from automax_ros.drive.base.errors import ParameterError
-from automax_ros.drive.plant.faults import values_of, work_on
+from automax_ros.drive.plant.faults import execute_verb, values_of
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.modules.module import Operable
 from automax_ros.rack.rack import Rack
@@ -69,7 +69,7 @@ class SwitchOperations:
             reports.refuse("plant", str(error), detail=detail)
         plant.advance(self._rack.now_ns)
         try:
-            work_on(plant, verb, values)
+            execute_verb(plant, verb, values)
         except ParameterError as error:
             reports.refuse("plant", str(error), detail=detail)
         reports.done("plant", detail=detail)

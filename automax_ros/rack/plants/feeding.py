@@ -62,7 +62,7 @@ class _Round:
             value = memory.accepted(view, feed.value(plant), element)
             if memory.read_now(view, element) != value:
                 self._inputs.write(view, element, value, feed.writer)
-        self._observers.tell_writes()
+        self._observers.report_writes()
 
 
 class PlantFeeds:

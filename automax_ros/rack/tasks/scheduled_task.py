@@ -39,7 +39,7 @@ class ScanEnd:
             self._observers.scanned(task, record)
         inputs = self._inputs
         if inputs.frozen and inputs.scanned(task.name):
-            self._observers.tell_writes()
+            self._observers.report_writes()
         if task.status is _FAULTED:
             last = task.errors.last
             reason = f"task {task.name}: {last.describe() if last else 'fault'}"

@@ -43,7 +43,7 @@ class RackServices:
     """Services of a rack for its modules.
 
     ``execution`` returns, for a module's name, the execution of its scans; ``after`` is called after each scan, with
-    None if a task has faulted, ``no_event`` with a task whose event did not come in time. ``tell_writes`` reports to
+    None if a task has faulted, ``no_event`` with a task whose event did not come in time. ``report_writes`` reports to
     observers the writes that were not made by a scan. A 57C406 attaches itself to ``drives``. ``plants`` are those with
     a motor, by name; the rack keeps their states. ``stopwatch`` (ns, monotonic) measures execution times; without one
     they count as 0.
@@ -64,7 +64,7 @@ class RackServices:
     execution: Callable[[str], Execution]
     after: After
     no_event: Callable[[Task], None]
-    tell_writes: Callable[[], None]
+    report_writes: Callable[[], None]
     stopwatch: Callable[[], int] | None
 
     @cached_property

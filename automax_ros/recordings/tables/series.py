@@ -155,7 +155,7 @@ class Series:
             elif isinstance(message, (CommonImage, CommonWrite)):
                 entries = self._log.take(message)
                 if self._take_writes is not None and entries and isinstance(message, CommonWrite):
-                    self._tell_writes(message, entries)
+                    self._note_writes(message, entries)
             else:
                 self._take_other(entry)
                 continue
@@ -183,7 +183,7 @@ class Series:
             if self._window.holds(time):
                 self._take_scan(time, message)
 
-    def _tell_writes(self, message: CommonWrite, entries: Iterable[Entry]) -> None:
+    def _note_writes(self, message: CommonWrite, entries: Iterable[Entry]) -> None:
         """Report a write from outside, without the registers under I/O points, which repeat the same write."""
         writer, time = self._outside.get(message.writer), max(0, message.stamp - self.origin_ns)
         if writer is None or message.kind != WriteKind.OUTSIDE or not self._window.holds(time):

@@ -197,7 +197,7 @@ class ModuleNode(RackRosNode):
                 joined()
 
         def incompatible(info: QoSOfferedIncompatibleQoSInfo) -> None:
-            self.misfit(f"a reader of {topic.name} gets nothing", info)
+            self.report_qos_conflict(f"a reader of {topic.name} gets nothing", info)
 
         events = PublisherEventCallbacks(
             matched=self.guarded_callback(topic.name, matched) if joined is not None else None,
@@ -223,7 +223,9 @@ class ModuleNode(RackRosNode):
         name = f"{config.namespace}/{self.get_name()}: {part}"
         return status_of(name, f"{config.name} slot {slot}", level, text, values)
 
-    def misfit(self, what: str, info: QoSOfferedIncompatibleQoSInfo | QoSRequestedIncompatibleQoSInfo) -> None:
+    def report_qos_conflict(
+        self, what: str, info: QoSOfferedIncompatibleQoSInfo | QoSRequestedIncompatibleQoSInfo
+    ) -> None:
         """Report a subscriber or publisher with an incompatible quality of service; ``what`` says what is lost."""
         policy = str(qos_policy_name_from_kind(info.last_policy_kind)).lower()
         text = f"{what}: its quality of service does not fit ({policy})"

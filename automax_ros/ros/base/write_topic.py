@@ -79,7 +79,7 @@ class WriteTopic:
 
     def _incompatible(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
         if info.last_policy_kind != QoSPolicyKind.RELIABILITY:
-            self._node.misfit(f"what a writer of {self._topic} sends is lost", info)
+            self._node.report_qos_conflict(f"what a writer of {self._topic} sends is lost", info)
         elif not self._reads_best_effort:
             self._reads_best_effort = True
             self._subscribe(BEST_EFFORT_COMMAND, None)

@@ -84,7 +84,7 @@ class RecordedRun:
         self._unknown: dict[bytes, UnknownPublisher] = {}
         self._reported: set[str] = set()
         self.news: list[str] = []
-        self.tells_senders = library() is not None
+        self.knows_senders = library() is not None
 
     def racks(self) -> set[bytes]:
         """Return the participants that are racks of this name."""
@@ -107,11 +107,11 @@ class RecordedRun:
         if self._home in racks and len(racks) > 1 and not self._has_rival:
             self._has_rival = True
             self.news.append(f"another rack is called {self._space} too: it is not recorded")
-        return not self.tells_senders or self._home in racks
+        return not self.knows_senders or self._home in racks
 
     def is_ours(self, topic: str, taken: RawMessage) -> bool:
         """Return whether a message comes from the rack; those of other programs are counted for ``look``."""
-        if not self.tells_senders:
+        if not self.knows_senders:
             return True
         sender = participant(taken.sender)
         if sender == self._home or sender in self._others:

@@ -176,7 +176,7 @@ class LiveRecorder:
             while not stopping() and time.monotonic_ns() < deadline:
                 for found in source.taken():
                     tables[participant(found.sender)] = found
-                racks = self.binding.racks() if self.binding.tells_senders else set(tables)
+                racks = self.binding.racks() if self.binding.knows_senders else set(tables)
                 if len(tables) > MOST_TABLES:
                     tables = {sender: found for sender, found in tables.items() if sender in racks}
                 if len(racks) > 1:

@@ -33,9 +33,9 @@ from automax_ros.messages.bus.bus import (
     BusLimits,
     batch_of,
     image_message,
-    picture_of,
-    standing_of,
-    with_standing,
+    image_of,
+    stop_state_of,
+    with_stop_state,
     write_message,
 )
 from automax_ros.messages.bus.peers import BEAT_NS, Peer, Peers, PresenceVerdict
@@ -175,7 +175,7 @@ class DistributedMemory:
         for take in waiting:
             take()
         for peer in self.peers.running():
-            self.link.adopt(standing_of(peer.presence))
+            self.link.adopt(stop_state_of(peer.presence))
 
     def leave(self) -> None:
         """Announce that this process ends normally."""
@@ -205,7 +205,7 @@ class DistributedMemory:
             asks,
         )
         presence = presence._replace(host=this_host(), pid=os.getpid())
-        self._presences.publish(encode(with_standing(presence, self.link.standing)))
+        self._presences.publish(encode(with_stop_state(presence, self.link.standing)))
 
     def _send_image(self, asked_by: int) -> None:
         now = time.monotonic_ns()
@@ -319,7 +319,7 @@ class DistributedMemory:
         if wrong:
             self._refuse("bus/image", wrong)
             return
-        picture = picture_of(message, self._texts)
+        picture = image_of(message, self._texts)
         if message.asked_by != FOR_ALL:
             peer.caught_up(message.sequence)
             self._has_image = True
@@ -356,7 +356,7 @@ class DistributedMemory:
         if presence.asks == self.peers.process:
             self._send_image(presence.process)
         if self._begun and presence.run_id == self.run_id:
-            self.link.adopt(standing_of(presence))
+            self.link.adopt(stop_state_of(presence))
 
     def _take_missing(self, presence: Presence) -> None:
         """Take the batches that wait on the bus, before those that a presence announced count as missing.

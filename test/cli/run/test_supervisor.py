@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli.run.process_messages import ProcessOutput, Reported, TextLine, heard, tell_report
+from automax_ros.cli.run.process_messages import ProcessOutput, Reported, TextLine, heard, send_report
 from automax_ros.cli.run.status import Progress, Summary, merged_progress, merged_summary
 from automax_ros.cli.run.supervisor import BACKOFFS_NS, STAGE_NS, WINDOW_NS, ProcessSpec, Restarts, Supervisor
 from automax_ros.core.ticks import NS_PER_S
@@ -228,7 +228,7 @@ def test_what_a_process_tells_is_heard_alike(capsys):
     screen.progress(progress)
     screen.summary(summary)
     screen.message("a line")
-    tell_report({"rack": "PM1"})
+    send_report({"rack": "PM1"})
     lines = capsys.readouterr().out.splitlines()
     assert [heard(line) for line in lines] == [progress, summary, TextLine("a line"), Reported({"rack": "PM1"})]
 
@@ -253,7 +253,7 @@ def test_parts_of_a_rack_are_told_as_one():
 
 
 def test_json_of_a_report_is_one_line(capsys):
-    tell_report({"text": "a\nb"})
+    send_report({"text": "a\nb"})
     (line,) = capsys.readouterr().out.splitlines()
     assert json.loads(line) == {"report": {"text": "a\nb"}}
 

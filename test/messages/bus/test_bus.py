@@ -5,7 +5,14 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.messages.bus.bus import batch_of, image_message, picture_of, standing_of, with_standing, write_message
+from automax_ros.messages.bus.bus import (
+    batch_of,
+    image_message,
+    image_of,
+    stop_state_of,
+    with_stop_state,
+    write_message,
+)
 from automax_ros.messages.bus.peers import HUNG_NS, MISSING_NS, SILENCE_NS, Peers, PresenceVerdict
 from automax_ros.messages.cdr.cdr import CdrError, decode, encode
 from automax_ros.messages.types.messages import NAMES, BusImage, BusWrite, Presence, Stage, Values
@@ -40,14 +47,14 @@ def test_a_batch_comes_back_from_its_bytes():
 def test_an_image_comes_back_from_its_bytes():
     message = there_and_back(image_message(PICTURE, 5, 42, 77, 78))
     assert (message.asked_by, message.process) == (78, 77)
-    assert picture_of(message, TEXTS) == PICTURE
+    assert image_of(message, TEXTS) == PICTURE
 
 
 @pytest.mark.parametrize("cause", [None, StopCause(12, "bus error", "31", "SPEED"), StopCause(12, "by hand")])
 def test_the_standing_comes_back_from_a_presence(cause):
     standing = StopState(12, 3, cause)
-    presence = there_and_back(with_standing(said(), standing))
-    assert standing_of(presence) == standing
+    presence = there_and_back(with_stop_state(said(), standing))
+    assert stop_state_of(presence) == standing
 
 
 def test_what_does_not_fit_together_is_not_a_message():
@@ -59,8 +66,8 @@ def test_what_does_not_fit_together_is_not_a_message():
     image = image_message(PICTURE, 5, 42, 77, 78)
     for field in ("mask", "since_ns", "seat", "order", "force_held", "force_order"):
         with pytest.raises(CdrError, match="length"):
-            picture_of(image._replace(**{field: getattr(image, field)[1:]}), TEXTS)
-    assert picture_of(BusImage(1, 2, 3, 4, 5), TEXTS) == ImageCopy(4, (), ())
+            image_of(image._replace(**{field: getattr(image, field)[1:]}), TEXTS)
+    assert image_of(BusImage(1, 2, 3, 4, 5), TEXTS) == ImageCopy(4, (), ())
 
 
 def said(process=5, seat=2, *, run_id=42, state=Stage.RUNNING, fingerprint=1, sequence=0) -> Presence:

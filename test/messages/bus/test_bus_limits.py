@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.messages.bus.bus import AHEAD_NS, BusLimits, with_standing
+from automax_ros.messages.bus.bus import AHEAD_NS, BusLimits, with_stop_state
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Values
 from automax_ros.rack.distributed.image_sync import StopState
@@ -98,4 +98,4 @@ def test_what_cannot_be_true_of_an_image_is_refused(forged):
 def test_after_whatever_is_taken_a_later_stop_can_be_told(standing_ns, seat, epoch_ns, sequence):
     presence = TRUE._replace(standing_ns=standing_ns, standing_seat=seat, epoch_ns=epoch_ns, sequence=sequence)
     if not LIMITS.of_presence(presence, WALL_NS, LATEST_NS):
-        encode(with_standing(presence, StopState(standing_ns + 1, seat)))
+        encode(with_stop_state(presence, StopState(standing_ns + 1, seat)))

@@ -136,7 +136,7 @@ def test_a_scan_that_was_late_gives_way_to_what_was_written_after_its_deadline(c
     one.hear(home)
     one.rack.memory.now_ns = 5 * NS_PER_MS
     one.rack.memory.commit([(one.rack.memory.view("B%"), 5), (one.rack.memory.view("OUT%"), 0)], writer=3)
-    one.rack.observers.tell_writes()
+    one.rack.observers.report_writes()
     home.hear(one)
     assert one.rack.value("B%") == home.rack.value("B%") == 70
     assert one.rack.value("OUT%") == home.rack.value("OUT%") == 8
