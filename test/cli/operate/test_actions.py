@@ -2,6 +2,7 @@
 
 import argparse
 import importlib
+import inspect
 from types import SimpleNamespace
 
 import pytest
@@ -10,6 +11,7 @@ from system.support import RACKS
 from automax_ros.cli.operate.actions import ACTIONS
 from automax_ros.cli.options.rack_name import space_of
 from automax_ros.core.user_error import UsageError, UserError
+from automax_ros.rack.operator.requests import VERBS
 
 
 def asked(action: str, *words: str) -> list[dict[str, object]]:
@@ -97,6 +99,18 @@ def test_every_action_asks_a_service_with_fields_that_it_has(name, tmp_path):
     for call in ACTIONS[name].calls(parser.parse_args(list(given))):
         package, _, kind = call.type_name.partition("/")
         assert getattr(importlib.import_module(f"{package}.srv"), kind).Request(**call.fields)
+        assert not ACTIONS[name].by_operator or VERBS[call.service].type_name == call.type_name
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_every_verb_takes_the_fields_of_its_request(name):
+    """A node passes them on by their names."""
+    pytest.importorskip("automax_msgs.srv")
+    package, _, kind = VERBS[name].type_name.partition("/")
+    request = getattr(importlib.import_module(f"{package}.srv"), kind).Request
+    fields = dict.fromkeys(request.get_fields_and_field_types())
+    for function in (VERBS[name].act, VERBS[name].now):
+        inspect.signature(function).bind(None, **fields)
 
 
 def test_an_answer_with_more_names_than_values_is_an_error_and_no_traceback():
