@@ -349,10 +349,12 @@ class RackNodes:
     def _deliver(self) -> None:
         """Wait until subscribers have received all: a writer that is destroyed sends nothing again."""
         deadline_ns = time.monotonic_ns() + (DELIVERY_TO_RECORDER_NS if self._site.is_recorded else DELIVERY_NS)
-        for publisher in (publisher for node in self.nodes for publisher in node.publishers):
-            if not self._context.ok():
-                return
-            publisher.wait_for_all_acked(Duration(nanoseconds=max(0, deadline_ns - time.monotonic_ns())))
+        waiting = [publisher for node in self.nodes for publisher in node.publishers]
+        # Without a time to wait: rclpy would keep all other threads of Python, and its signals, from running meanwhile.
+        while waiting and self._context.ok() and time.monotonic_ns() < deadline_ns:
+            waiting = [publisher for publisher in waiting if not publisher.wait_for_all_acked(Duration())]
+            if waiting:
+                time.sleep(LOOK_S)
 
     def __enter__(self) -> RackNodes:
         """Return itself."""

@@ -62,13 +62,13 @@ def test_simulated_rack_tells_the_clock_after_all_messages_of_the_instant(made):
     live = made(simulated=SimulatedTime())
     happened: list[tuple[str, int]] = []
     clock = live.nodes._clock
-    tell = clock.pace._tell
+    publish = clock.pace._publish
 
     def told(now_ns):
-        tell(now_ns)
+        publish(now_ns)
         happened.append(("clock", now_ns))
 
-    clock.pace._tell = told
+    clock.pace._publish = told
     live.stream.add_sink(
         lambda topic: (lambda stamp, _: happened.append(("scan", stamp))) if "scans" in topic.name else None
     )
