@@ -89,9 +89,7 @@ def _structure(kind: Any) -> tuple[Any, Weigh]:
             assert of_part is not None
             total += of_part(getattr(message, name))
             if total > MOST:
-                raise RequestTooLarge(
-                    f"it is larger than a rack takes: more than {MOST:,} as message_weight.py weighs it"
-                )
+                raise RequestTooLarge(f"it is larger than a rack takes: to read it costs more than {MOST:,} numbers")
         return total
 
     return structure, weigh
