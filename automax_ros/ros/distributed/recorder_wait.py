@@ -1,12 +1,16 @@
 """Waits, in a process of a distributed rack, for a recorder that will receive all of its messages.
 
-It looks for the recorder's subscriptions in the graph: a reliable writer that is matched with a reader before its first
-message delivers all messages to it.
+It looks for the recorder's subscriptions in the graph, and whether DDS has matched its own publishers with as many
+readers: a reliable writer that is matched with a reader before its first message delivers all messages to it. On a full
+machine the graph shows a reader half a second before.
 """
 
 from __future__ import annotations
 
 import time
+from typing import Any
+
+from rclpy.qos import DurabilityPolicy
 
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.recordings.live.topics import LiveTopics
@@ -29,7 +33,7 @@ class RecorderWait:
     """
 
     def __init__(self, site: RackContext, node: ModuleNode, *others: str) -> None:
-        self._node = node
+        self._node, self._publishers = node, site.publishers
         self._space, self._name = f"/{site.rack.config.namespace}", recorder_name(site.arguments)
         recorded = LiveTopics.expected(self._space, site.rack.config).all
         sent = [topic.name for topic in site.stream.topics if topic.name in recorded]
@@ -46,4 +50,13 @@ class RecorderWait:
 
     def _is_read(self, topic: str) -> bool:
         readers = self._node.get_subscriptions_info_by_topic(topic)
-        return any(item.node_name == self._name and item.node_namespace == self._space for item in readers)
+        if not any(item.node_name == self._name and item.node_namespace == self._space for item in readers):
+            return False
+        own = [publisher for publisher in self._publishers if publisher.topic_name == topic]
+        return all(publisher.get_subscription_count() >= self._fitting(readers, publisher) for publisher in own)
+
+    @staticmethod
+    def _fitting(readers: list[Any], publisher: Any) -> int:
+        """Return how many readers a publisher is matched with in the end; one that wants more than it offers is not."""
+        latched = publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        return sum(latched or item.qos_profile.durability == DurabilityPolicy.VOLATILE for item in readers)
