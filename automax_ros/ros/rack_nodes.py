@@ -167,7 +167,7 @@ class RackNodes:
         self._to_begin: _Beginning | None = None
         if manager is not None:
             self.rack.observers.add(Follower(manager))
-        self.bus = None if seating is None else DistributedMemory(self._site, self.nodes[0], seating)
+        self.bus = None if seating is None else DistributedMemory(self._site, self.nodes, seating)
         if seating is None:
             PresencePublisher(self._site, self.nodes[0])
         self._desk = None if self.bus is None else forward_operator(self.nodes, self.bus)

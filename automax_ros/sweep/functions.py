@@ -9,6 +9,7 @@ the measure's window.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from bisect import bisect_left
 
 from automax_ros.core.ticks import NS_PER_S
@@ -21,7 +22,7 @@ _RISE = (0.1, 0.9)
 _PERCENT = 100.0
 
 
-class Accumulator:
+class Accumulator(ABC):
     """Receives a signal piece by piece and returns one number.
 
     ``begin`` receives the value of the signal just before the window, which most functions ignore; ``hold`` a value
@@ -29,14 +30,16 @@ class Accumulator:
     value and the window's length, None if the signal has none.
     """
 
-    def begin(self, before: float) -> None:
+    def begin(self, before: float) -> None:  # noqa: B027
         pass
 
+    @abstractmethod
     def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
-        raise NotImplementedError
+        pass
 
+    @abstractmethod
     def result(self, last: float, end_ns: int) -> float | None:
-        raise NotImplementedError
+        pass
 
 
 class Mean(Accumulator):
@@ -209,26 +212,23 @@ def _last_below(stack: list[tuple[float, int]], level: float) -> int:
     return stack[place - 1][1] if place else 0
 
 
-class Overshoot(Accumulator):
+class Overshoot(Range):
     """How far a signal exceeds its target, % of the step from its value before the window; None without a step."""
 
     def __init__(self, target: float | None = None) -> None:
+        super().__init__()
         self._target, self._start = target, 0.0
-        self._range = Range()
 
     def begin(self, before: float) -> None:
         """Store the value at which the step starts."""
         self._start = before
-
-    def hold(self, value: float, begin_ns: int, end_ns: int) -> None:  # noqa: ARG002
-        self._range.hold(value)
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
         target = last if self._target is None else self._target
         step = target - self._start
         if step == 0:
             return None
-        beyond = self._range.most - target if step > 0 else target - self._range.least
+        beyond = self.most - target if step > 0 else target - self.least
         return max(0.0, beyond / abs(step) * _PERCENT)
 
 

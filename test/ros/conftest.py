@@ -1,5 +1,7 @@
 """What tests of live nodes share: a client in the graph, a live rack, its services."""
 
+import time
+
 import pytest
 
 from automax_ros.rack.rack import Rack
@@ -36,7 +38,7 @@ def live(request, ros_domain_id, tmp_path):
         (tmp_path / f"{name}.BLK").write_text(text)
     if hasattr(request.module, "RACK"):
         config.write_text(request.module.RACK)
-    made = LiveRack(Rack(load(config).config))
+    made = LiveRack(Rack(load(config).config, stopwatch=time.monotonic_ns))
     made.start([])
     yield made
     made.close()
@@ -44,12 +46,14 @@ def live(request, ros_domain_id, tmp_path):
 
 @pytest.fixture
 def ask(live, client):
-    """Calls a service of the live rack, and returns the response."""
+    """Calls a service of the live rack, whose type is a class or the name of one of automax_msgs."""
+    import automax_msgs.srv
     from std_srvs.srv import Trigger
 
     clients = {}
 
     def ask(service, kind=Trigger, **fields):
+        kind = getattr(automax_msgs.srv, kind) if isinstance(kind, str) else kind
         if service not in clients:
             clients[service] = client.node.create_client(kind, f"/{live.rack.config.namespace}/{service}")
             until(live, client, clients[service].service_is_ready)

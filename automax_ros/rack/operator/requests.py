@@ -9,15 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
-from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
-from automax_ros.compile.base.layout import Role
-from automax_ros.core.diagnostics import SourceText, render
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.text import count_of, printable, quoted
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
-from automax_ros.core.types import DataType, Value
+from automax_ros.core.types import DataType
 from automax_ros.core.values import source_text, value_of, wanted
 from automax_ros.rack.base.local_names import LocalElement
 from automax_ros.rack.base.stop_cause import OperationRefused
@@ -25,10 +22,9 @@ from automax_ros.rack.operations.forces import Target
 from automax_ros.rack.operator.faults import DriveTrips, displays_of
 from automax_ros.rack.operator.halting import Halting
 from automax_ros.rack.operator.readings import MAX_NAME, MAX_NAMES, Reading, Readings
+from automax_ros.rack.operator.reloads import Reloads
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.tasks.installation import PreparedReload, RackError
-from automax_ros.rackfile.reading.files import MAX_BYTES
 from automax_ros.runtime.tasks.task import Status
 
 MAX_VALUE = 1000
@@ -38,25 +34,16 @@ MOST_OFF_S = 86_400
 PLACES = ("first", "second", "last")
 """The entries that the error log keeps."""
 DELETED = "deleted"
-_MOST_FINDINGS = 100
 
 Fields = Mapping[str, Any]
 """Fields of an answer; those of a list of messages are mappings again."""
 
 
-class ReloadRefused(OperationRefused):
-    """A source was refused; ``findings`` are those of its check, each as a text of several lines."""
-
-    def __init__(self, reason: str, findings: Sequence[str]) -> None:
-        super().__init__(reason)
-        self.findings = tuple(findings)
-
-
 class OperatorRequests:
     """Executes an operator's requests to one rack. Arguments have the names of the requests' fields.
 
-    Methods return the fields of the answer that the execution determines. Those named ``..._now`` return what is true
-    afterwards, for the same arguments.
+    ``reloads`` has the parts of a reload. Methods return the fields of the answer that the execution determines. Those
+    named ``..._now`` return what is true afterwards, for the same arguments.
 
     Raises:
         OperationRefused: all methods, if the rack refuses or a text cannot be parsed.
@@ -65,7 +52,7 @@ class OperatorRequests:
     def __init__(self, rack: Rack, pace: object = None) -> None:
         """Create for a rack and its pacer, if it has one."""
         self._rack, self._reports = rack, rack.operations.reports
-        self._readings, self._halting = Readings(rack), Halting(rack, pace)
+        self._readings, self._halting, self.reloads = Readings(rack), Halting(rack, pace), Reloads(rack)
         self._trips = DriveTrips(rack)
 
     def run(self, task: str) -> None:
@@ -188,59 +175,13 @@ class OperatorRequests:
         SwitchOperations(self._rack).plant(name.strip().upper(), control.strip(), value.strip())
 
     def reload(self, task: str, source: str, *, keep_state: bool = False) -> Fields:
-        """Replace a task's source by a text; ``admit_reload``, ``prepare`` and ``install`` are its parts.
+        """Replace a task's source by a text.
 
         Raises:
             ReloadRefused: the source has errors; the old one continues.
         """
-        return {"lost": self.install(self.prepare(*self.admit_reload(task, source)), keep_state=keep_state)}
-
-    def admit_reload(self, task: str, source: str) -> tuple[str, SourceText]:
-        """Return the task of a reload and its new source: first part of a reload, short.
-
-        Findings name the task, such as ``SPEED.BLK:1:1``: the text is not the rack's file (decision).
-        """
-        name = self._task("reload", task)
-        if len(source) > MAX_BYTES:
-            reason = f"a source of {len(source)} characters: at most {MAX_BYTES} are read"
-            self._reports.refuse("reload", reason, name)
-        self._rack.operations.admit_reload(name)
-        return name, SourceText(f"{name}{Path(self._rack.sources[name].name).suffix}", source)
-
-    def prepare(self, name: str, source: SourceText) -> PreparedReload:
-        """Check and compile a source: second part of a reload, long; on any thread, while the rack scans."""
-        return self._rack.operations.installation.prepare(name, source)
-
-    def is_current(self, prepared: PreparedReload) -> bool:
-        """Return whether a source was prepared for the tasks as they are now; else it must be prepared again."""
-        return self._rack.operations.installation.is_current(prepared)
-
-    def install(self, prepared: PreparedReload, *, keep_state: bool = False) -> str:
-        """Install the prepared source of a task: last part of a reload, short.
-
-        Returns in words which tuned values the task has lost, "" if none: an installation takes them from the source.
-
-        Raises:
-            ReloadRefused: the source has errors; the old one continues.
-        """
-        before = self._tunables(prepared.task)
-        try:
-            self._rack.operations.install(prepared, keep_state=keep_state)
-        except RackError as error:
-            found = [render(item, where) for where, items in error.findings for item in items]
-            raise ReloadRefused(str(error), found[:_MOST_FINDINGS]) from error
-        now = self._tunables(prepared.task)
-        lost = {name: held for name, (held, initial) in before.items() if held != initial}
-        return ", ".join(
-            f"{name} was tuned to {source_text(held)} and is "
-            + (f"{source_text(now[name][0])} again" if name in now else "not there any more")
-            for name, held in lost.items()
-            if name not in now or now[name][0] != held
-        )
-
-    def refuse_reload(self, task: str, reason: str) -> NoReturn:
-        """Refuse a reload for a reason of the caller's."""
-        self._reports.refuse("reload", reason, self._task("reload", task))
+        prepared = self.reloads.prepare(*self.reloads.admit(task, source))
+        return {"lost": self.reloads.install(prepared, keep_state=keep_state)}
 
     def get(self, names: Sequence[str]) -> list[tuple[str, str]]:
         """Return commons, their elements, and variables of tasks (``TASK.NAME``): each name with its value's text."""
@@ -309,13 +250,6 @@ class OperatorRequests:
     @property
     def _running(self) -> int:
         return sum(task.status is Status.RUNNING for task in self._rack.tasks)
-
-    def _tunables(self, name: str) -> dict[str, tuple[Value, Value]]:
-        """Return the tunables of a task with their values, and those of its source."""
-        task = self._rack.task(name)
-        names = [item.name for item in task.layout.fields if item.role is Role.TUNABLE]
-        initial = {item.name: item.initial for item in task.layout.fields}
-        return {name: (value, initial[name]) for name in names if not isinstance(value := task.value(name), list)}
 
     def _give(self, what: str, name: str, text: str, act: Callable[[Target, Any], None]) -> Fields:
         """Give a variable the value that a text means; return the texts of its values before and now."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -75,7 +76,7 @@ class RackLayout:
         return sorted((item for item in self.placed if item.kind is kind), key=lambda item: item.slot)
 
 
-class ModuleKind:
+class ModuleKind(ABC):
     """A kind of module: its options in a rack file, and its allowed slots.
 
     ``word`` names the kind in messages; ``models`` are its catalogue numbers, each with its title; ``options`` the keys
@@ -88,9 +89,9 @@ class ModuleKind:
     options: Keys = MappingProxyType({})
     table: Mapping[str, Registers] = MappingProxyType({})
 
+    @abstractmethod
     def read(self, found: ModuleSection) -> ModuleConfig | None:
         """Read a module's section; report errors in the findings, and return None if no configuration results."""
-        raise NotImplementedError
 
-    def check_places(self, rack: RackLayout) -> None:
+    def check_places(self, rack: RackLayout) -> None:  # noqa: B027
         """Report modules of this kind in slots where they may not be, or that are missing; most may be anywhere."""

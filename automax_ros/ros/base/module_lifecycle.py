@@ -22,7 +22,7 @@ from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.modules.module import Module
 from automax_ros.rack.operator.module_tasks import ModuleTasks
-from automax_ros.rack.operator.requests import OperatorRequests, ReloadRefused
+from automax_ros.rack.operator.reloads import ReloadRefused, Reloads
 from automax_ros.rack.tasks.installation import PreparedReload
 from automax_ros.ros.base.lifecycle import ACTIVE, INACTIVE, UNCONFIGURED, LifecycleNode, Pending, TransitionRefused
 from automax_ros.ros.base.node import ModuleNode, RackContext
@@ -106,7 +106,7 @@ class ModuleLifecycle:
 
     def __init__(self, node: ManagedModuleNode, module: Module) -> None:
         self._node, self._site = node, node.site
-        self._tasks, self._orders = ModuleTasks(node.site.rack, module), OperatorRequests(node.site.rack)
+        self._tasks, self._reloads = ModuleTasks(node.site.rack, module), Reloads(node.site.rack)
 
     @property
     def state(self) -> str | None:
@@ -164,8 +164,8 @@ class ModuleLifecycle:
                     if error is not None:
                         raise error
                     assert found is not None
-                    if self._orders.is_current(found):
-                        self._orders.install(found)
+                    if self._reloads.is_current(found):
+                        self._reloads.install(found)
                     still = [item for item in names if item in self._tasks.deleted]
                 except Exception as fault:
                     finish(self._given_up(name, fault))
@@ -173,7 +173,7 @@ class ModuleLifecycle:
                     return
                 self._reload(still, finish)
 
-        self._node.work.do(lambda: self._orders.prepare(name, self._tasks.source(name)), prepared)
+        self._node.work.do(lambda: self._reloads.prepare(name, self._tasks.source(name)), prepared)
 
     def _given_up(self, name: str, fault: Exception) -> Exception:
         """Delete the tasks reloaded so far, and return the error of the transition."""

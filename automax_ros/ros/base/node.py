@@ -143,7 +143,7 @@ class RackContext:
     """One rack in this process, and what its nodes share: ``context`` is rclpy's, of all of them.
 
     The thread that accesses the rack holds ``lock``, one at a time, between scans. ``is_recorded``: a recorder that was
-    started with it must receive every message of a stream. ``publishers`` are those of the stream's topics.
+    started with it must receive every message of a stream.
     """
 
     rack: Rack
@@ -156,7 +156,6 @@ class RackContext:
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     lock: RackLock = field(default_factory=RackLock)
     is_recorded: bool = False
-    publishers: list[Any] = field(default_factory=list)
 
     @property
     def holds_common_memory(self) -> bool:
@@ -208,9 +207,7 @@ class ModuleNode(RackRosNode):
         qos = ros_qos(topic.qos)
         if self.site.is_recorded and topic.qos is SCAN:
             qos.depth = RECORDED_DEPTH
-        publisher = self.create_publisher(kind, topic.name, qos, event_callbacks=events)
-        self.site.publishers.append(publisher)
-        publish = publisher.publish
+        publish = self.create_publisher(kind, topic.name, qos, event_callbacks=events).publish
         return lambda _, payload: publish(payload)
 
     def diagnose(self, statuses: Source) -> None:

@@ -100,8 +100,8 @@ class DistributedMemory:
     ``seats`` are the slots of all processes by the slot that names each; ``plants`` are those of the plants' drives.
     """
 
-    def __init__(self, site: RackContext, node: ModuleNode, seating: ProcessLayout) -> None:
-        """Join the bus.
+    def __init__(self, site: RackContext, nodes: Sequence[ModuleNode], seating: ProcessLayout) -> None:
+        """Join the bus by the first of the process's nodes.
 
         Raises:
             ValueError: the rack's part is not one of the seats.
@@ -110,6 +110,7 @@ class DistributedMemory:
         own = next((slots for slots in seats if set(slots) == rack.part.slots), None)
         if own is None:
             raise ValueError(f"slots {sorted(rack.part.slots)} are not a process of rack {rack.config.name}")
+        node = nodes[0]
         self._site, self._rack, self._node = site, rack, node
         self.seats = {min(slots): tuple(slots) for slots in seats}
         self._limits = BusLimits(self.seats)
@@ -118,7 +119,7 @@ class DistributedMemory:
         self._watch, self._lead_ns = ProcessWatch(), seating.start_delay_ns
         self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
         self.link = ImageSync(rack, min(own), self._send, seating.is_common, self._guarded)
-        self._recorder = RecorderWait(site, node, PRESENCE) if seating.awaits_recorder else None
+        self._recorder = RecorderWait(site, nodes, PRESENCE) if seating.awaits_recorder else None
         self.stage, self.joining = Stage.JOINING, False
         self.fault: ProcessAlreadyRuns | None = None
         self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)

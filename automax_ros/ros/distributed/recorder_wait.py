@@ -8,6 +8,7 @@ machine the graph shows a reader half a second before.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.qos import DurabilityPolicy
@@ -29,11 +30,11 @@ def recorder_name(arguments: RosArguments) -> str:
 class RecorderWait:
     """Checks whether a recorder has subscribed to the topics of one process.
 
-    These are the topics that the stream of this process publishes, and ``others``, topics of the rack.
+    These are the topics that the stream of this process publishes, by ``nodes``, and ``others``, topics of the rack.
     """
 
-    def __init__(self, site: RackContext, node: ModuleNode, *others: str) -> None:
-        self._node, self._publishers = node, site.publishers
+    def __init__(self, site: RackContext, nodes: Sequence[ModuleNode], *others: str) -> None:
+        self._nodes = nodes
         self._space, self._name = f"/{site.rack.config.namespace}", recorder_name(site.arguments)
         recorded = LiveTopics.expected(self._space, site.rack.config).all
         sent = [topic.name for topic in site.stream.topics if topic.name in recorded]
@@ -49,10 +50,11 @@ class RecorderWait:
         return not self._unread
 
     def _is_read(self, topic: str) -> bool:
-        readers = self._node.get_subscriptions_info_by_topic(topic)
+        readers = self._nodes[0].get_subscriptions_info_by_topic(topic)
         if not any(item.node_name == self._name and item.node_namespace == self._space for item in readers):
             return False
-        own = [publisher for publisher in self._publishers if publisher.topic_name == topic]
+        every = (publisher for node in self._nodes for publisher in node.publishers)
+        own = [publisher for publisher in every if publisher.topic_name == topic]
         return all(publisher.get_subscription_count() >= self._fitting(readers, publisher) for publisher in own)
 
     @staticmethod

@@ -39,7 +39,7 @@ class OperatorServices:
         self.forward_by: RequestForwarder | None = None
         self._requests = OperatorRequests(self._site.rack, self._site.pacer)
         self._begun_ns = time.monotonic_ns()
-        self._reloading = Reloading(node, self._requests, partial(self._concluded, "reload"))
+        self._reloading = Reloading(node, self._requests.reloads, partial(self._concluded, "reload"))
         self._answers: dict[str, Callable[[Any, Any], Any]] = {}
         for name, verb in VERBS.items():
             self._answers[name] = self._reloading.answer if name == "reload" else partial(self._answered, name)

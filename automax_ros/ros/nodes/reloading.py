@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from automax_ros.rack.operator.requests import OperatorRequests, ReloadRefused
+from automax_ros.rack.operator.reloads import ReloadRefused, Reloads
 from automax_ros.rack.tasks.installation import PreparedReload
 from automax_ros.ros.base.module_lifecycle import Background
 from automax_ros.ros.base.node import ModuleNode
@@ -22,8 +22,8 @@ Conclude = Callable[[Any, Any, Exception | None], Any]
 class Reloading:
     """Executes the reload requests of one node; call ``close`` when it leaves the graph."""
 
-    def __init__(self, node: ModuleNode, orders: OperatorRequests, conclude: Conclude) -> None:
-        self._site, self._orders, self._conclude = node.site, orders, conclude
+    def __init__(self, node: ModuleNode, reloads: Reloads, conclude: Conclude) -> None:
+        self._site, self._reloads, self._conclude = node.site, reloads, conclude
         self._work = Background(node)
         self._reloading = ""
 
@@ -32,14 +32,14 @@ class Reloading:
         with self._site.between_scans():
             try:
                 self._refuse_second(request.task)
-                name, source = self._orders.admit_reload(request.task, request.source)
+                name, source = self._reloads.admit(request.task, request.source)
             except Exception as error:
                 return self._conclude(request, response, error)
         self._reloading = name
 
         def begin(respond: Respond) -> None:
             self._work.do(
-                lambda: self._orders.prepare(name, source), lambda found, error: finish(found, error, respond)
+                lambda: self._reloads.prepare(name, source), lambda found, error: finish(found, error, respond)
             )
 
         def finish(prepared: PreparedReload, error: Exception | None, respond: Respond) -> None:
@@ -47,10 +47,10 @@ class Reloading:
                 try:
                     if error is not None:
                         raise error
-                    if not self._orders.is_current(prepared):
+                    if not self._reloads.is_current(prepared):
                         begin(respond)
                         return
-                    response.lost = self._orders.install(prepared, keep_state=request.keep_state)
+                    response.lost = self._reloads.install(prepared, keep_state=request.keep_state)
                 except Exception as raised:
                     error = raised
                     response.findings = list(raised.findings) if isinstance(raised, ReloadRefused) else []
@@ -66,4 +66,4 @@ class Reloading:
     def _refuse_second(self, task: str) -> None:
         if self._reloading:
             reason = f"the new source of {self._reloading} is still being compiled: ask again when that is done"
-            self._orders.refuse_reload(task, reason)
+            self._reloads.refuse(task, reason)

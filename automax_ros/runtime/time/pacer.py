@@ -62,8 +62,8 @@ class Pace(Protocol):
         """
 
 
-class SteppedPacer(Pace):
-    """A pacer of time that is not the wall clock's: its present is the last instant that was executed."""
+class LoopedPacer:
+    """The parts of a pacer's loop: scheduler, clock (ns, monotonic), how to wait, and the lock held as it acts."""
 
     def __init__(
         self,
@@ -73,10 +73,15 @@ class SteppedPacer(Pace):
         wait: Wait = WALL_WAIT,
         turn: Turn | None = None,
     ) -> None:
-        """Create it as ``Pacer``; ``clock`` only times what is done between events."""
+        """Create it; time does not pass yet."""
         self._scheduler, self._clock, self._wait = scheduler, clock, wait
         self._turn: Turn = nullcontext() if turn is None else turn
-        self._until_ns: int | None = None
+
+
+class SteppedPacer(LoopedPacer, Pace):
+    """A pacer of time that is not the wall clock's: its present is the last instant that was executed."""
+
+    _until_ns: int | None = None
 
     @property
     def now_ns(self) -> int:
@@ -118,23 +123,12 @@ class SteppedPacer(Pace):
         return self._until_ns is not None and self._scheduler.now_ns >= self._until_ns
 
 
-class Pacer:
-    """Keeps a scheduler on the wall clock."""
+class Pacer(LoopedPacer):
+    """Keeps a scheduler on the wall clock: time passes from ``begin`` on."""
 
-    def __init__(
-        self,
-        scheduler: Scheduler,
-        *,
-        clock: Callable[[], int] = WALL_CLOCK,
-        wait: Wait = WALL_WAIT,
-        turn: Turn | None = None,
-    ) -> None:
-        """Create it; time passes from ``begin`` on by ``clock`` (ns, monotonic). ``run`` holds ``turn`` as it acts."""
-        self._scheduler, self._clock, self._wait = scheduler, clock, wait
-        self._turn: Turn = nullcontext() if turn is None else turn
-        self._zero_ns: int | None = None
-        self.halted = False
-        self.while_halted: Callable[[], object] = lambda: None
+    halted = False
+    while_halted: Callable[[], object] = staticmethod(lambda: None)
+    _zero_ns: int | None = None
 
     def begin(self, start_delay_ns: int = 0) -> int:
         """Map the scheduler's present to ``start_delay_ns`` from now on the wall clock; return that time of day, ns."""

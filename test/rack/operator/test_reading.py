@@ -74,12 +74,12 @@ def test_values_are_shown_in_their_units(rack, orders):
 
 def test_a_reload_says_which_tuned_values_it_takes(orders):
     orders.tune("SPEED.KP", "1.5")
-    name, source = orders.admit_reload("SPEED", SPEED)
-    kept = orders.install(orders.prepare(name, source), keep_state=True)
+    name, source = orders.reloads.admit("SPEED", SPEED)
+    kept = orders.reloads.install(orders.reloads.prepare(name, source), keep_state=True)
     assert (kept, orders.get(["SPEED.KP"])) == ("", [("SPEED.KP", "1.5")])
-    lost = orders.install(orders.prepare(name, source))
+    lost = orders.reloads.install(orders.reloads.prepare(name, source))
     assert lost == "KP was tuned to 1.5 and is 0.5 again"
-    assert orders.install(orders.prepare(name, source)) == "", "nothing was tuned since"
+    assert orders.reloads.install(orders.reloads.prepare(name, source)) == "", "nothing was tuned since"
 
 
 @pytest.mark.parametrize("pattern", ["*" * 99 + "X", "*A" * 45 + "!", "?*" * 40 + "!", "[*", "*]"])

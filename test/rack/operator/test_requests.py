@@ -10,7 +10,8 @@ from recordings.live_racks import build
 
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.requests import MAX_NAME, MAX_NAMES, MAX_VALUE, OperatorRequests, ReloadRefused
+from automax_ros.rack.operator.reloads import ReloadRefused
+from automax_ros.rack.operator.requests import MAX_NAME, MAX_NAMES, MAX_VALUE, OperatorRequests
 from automax_ros.rack.rack import Rack
 
 YAML = """\
@@ -171,15 +172,15 @@ def test_stop_all_and_run_all(rack, told):
 
 def test_a_source_that_was_prepared_before_another_reload_is_known_to_be_old(rack, told):
     orders = OperatorRequests(rack)
-    named = orders.admit_reload("SPEED", SPEED.replace("TRIM%, OUTPUT", "7, OUTPUT"))
-    first = orders.prepare(*named)
-    assert orders.is_current(first)
+    named = orders.reloads.admit("SPEED", SPEED.replace("TRIM%, OUTPUT", "7, OUTPUT"))
+    first = orders.reloads.prepare(*named)
+    assert orders.reloads.is_current(first)
     assert (rack.run(0.02), rack.value("OUT%")) == (None, 101)
     orders.reload("SPEED", SPEED)
-    assert not orders.is_current(first)
-    again = orders.prepare(*named)
-    assert orders.is_current(again)
-    orders.install(again)
+    assert not orders.reloads.is_current(first)
+    again = orders.reloads.prepare(*named)
+    assert orders.reloads.is_current(again)
+    orders.reloads.install(again)
     rack.run(0.02)
     assert rack.value("OUT%") == 107
     assert [(item.what, item.ok) for item in told.operations] == [("reload", True), ("reload", True)]

@@ -2,47 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from ros.support import until
 
-OPERATED = Path(__file__).parents[2] / "system" / "racks" / "operated" / "rack.yaml"
-
-
-@pytest.fixture
-def live(ros_domain_id):
-    from automax_ros.ros.rack_nodes import LiveRack
-
-    made = LiveRack(Rack(load(OPERATED).config, stopwatch=time.monotonic_ns))
-    made.start([])
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def ask(live, client):
-    """Asks a service by its name, and returns the answer."""
-    import automax_msgs.srv
-    from std_srvs.srv import Trigger
-
-    clients = {}
-
-    def ask(service, kind="Trigger", **fields):
-        found = Trigger if kind == "Trigger" else getattr(automax_msgs.srv, kind)
-        if service not in clients:
-            clients[service] = client.node.create_client(found, f"/operated/{service}")
-            until(live, client, clients[service].service_is_ready)
-        future = clients[service].call_async(found.Request(**fields))
-        until(live, client, future.done)
-        return future.result()
-
-    return ask
+CONFIG = Path(__file__).parents[2] / "system" / "racks" / "operated" / "rack.yaml"
 
 
 def test_a_rack_is_halted_stepped_and_resumed(live, ask) -> None:
@@ -80,7 +47,7 @@ def test_answers_say_what_is_true_now(live, ask) -> None:
     assert (ask("stop", "OperateTask", task="NIL").status, ask("stop", "OperateTask").status) == ("", "")
     assert ask("delete", "OperateTask", task="line").status == "deleted"
     assert [item.status for item in ask("tasks", "ReadTasks").tasks] == ["deleted", "running"]
-    source = OPERATED.with_name("LINE.BLK").read_text()
+    source = CONFIG.with_name("LINE.BLK").read_text()
     wrong = ask("reload", "Reload", task="LINE", source=source.replace("COUNT!, ", "").replace("NIL%", ""))
     assert (wrong.ok, wrong.status, bool(wrong.findings)) == (False, "deleted", True)
     again = ask("reload", "Reload", task="LINE", source=source)
