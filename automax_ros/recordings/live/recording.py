@@ -50,7 +50,8 @@ _MALFORMED_NAMED = 3
 class LiveRecording(Recording):
     """One recording of a running rack; call ``take`` with every message in order, ``close`` finishes the bag.
 
-    ``failure`` is why the disk ended the recording, ``ended`` why the rack did; both are None until then.
+    ``failure`` is why the disk ended the recording, ``ended`` why the rack did; both are None until then. Of ``scans``
+    that are recorded ``executable`` can be executed again: they follow a state, or are their task's first.
     ``notes`` are lines for the user, which the caller removes.
     """
 
@@ -78,7 +79,7 @@ class LiveRecording(Recording):
         self.ended: str | None = None
         self.notes: list[str] = []
         self.gaps: list[Gap] = []
-        self.scans = self.writes = self.values = self.dropped = self.malformed = 0
+        self.scans = self.executable = self.writes = self.values = self.dropped = self.malformed = 0
         self.first_stamp: int | None = None
         self.last_stamp = 0
         self.replayable_from: int | None = None
@@ -231,6 +232,7 @@ class LiveRecording(Recording):
             return
         track.take_scan(head.scan, head.stamp)
         self.scans += 1
+        self.executable += track.ready or not head.scan
         self._write(topic, sent_ns, head.stamp, payload)
         self._look_whether_replayable(head.stamp)
         self._record_early(track)

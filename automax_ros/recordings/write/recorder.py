@@ -76,7 +76,9 @@ class Recorder(Recording):
         self._flush(self._stream.stamp(now_ns))
 
     def close(self) -> None:
-        """Finish the bag."""
+        """Finish the bag; that of a rack that was never started has its tables and its state, and no scan."""
+        if not self._stream.has_begun:
+            self._stream.repeat_facts(self._takes)
         self._finish()
 
     def _sink(self, topic: Topic) -> Take:

@@ -25,6 +25,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.recordings.live.recording import MAX_PENDING, LiveRecording
 from automax_ros.recordings.live.topics import LiveTopics
 from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.write.data_file import StorageOptions
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.replay.engine import replay
@@ -349,6 +350,8 @@ def test_whatever_is_lost_the_bag_tells_no_lies(tmp_path_factory, data):
     assert recording.failure is None
     assert recording.ended is None
     if recording.first_stamp is not None:
+        fault = verdict_of(BagReader(folder / "bag")).fault
+        assert (fault is None) == (recording.executable > 0), fault
         check_scans_saw_memory(folder / "bag")
         numbers: dict[str, int] = {}
         for scan in decoded(folder / "bag", "/line1/scans"):
@@ -461,6 +464,21 @@ def test_a_state_that_comes_before_its_scans_is_recorded_after_them(wire, tmp_pa
     notes = [note for task in replay(bag).tasks for note in task.notes]
     assert any("are missing before" in note for note in notes) == lost, notes
     assert lost or replay(bag).identical
+
+
+def test_a_recording_of_one_scan_says_that_nothing_of_it_can_be_replayed(wire, tmp_path):
+    """It ends before a scan that follows a state: the recorder knows it as the check of the bag does."""
+    wire.run(0.5)
+    first = wire.join()
+    wire.run(0.011)
+    recording = recording_of(wire, tmp_path / "bag")
+    feed(recording, [item for item in wire.sent[first:] if item.topic != "/line1/states"], first)
+    recording.close()
+    assert recording.scans > 0
+    assert recording.executable == 0
+    fault = verdict_of(BagReader(tmp_path / "bag")).fault
+    assert fault is not None
+    assert fault.code == "AMX6832"
 
 
 def test_repeated_messages_are_dropped(wire, tmp_path):

@@ -16,9 +16,11 @@ import automax_ros
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from automax_ros.recordings.mcap.errors import RecordingError
+from automax_ros.recordings.mcap.errors import BagError, RecordingError
 from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.write.recorder import Recorder
+from automax_ros.replay.engine import replay
 from recordings.live_racks import SPEED, WORK, YAML, build
 
 ROOT = Path(__file__).parents[3]
@@ -170,6 +172,22 @@ def test_write_log_gives_the_final_memory(tmp_path):
             keys = zip(write.values.variable, write.values.element, strict=True)
             memory.update(zip(keys, write.values.value, strict=True))
         assert {key: memory[key] for key in final} == final
+
+
+def test_the_recording_of_a_rack_that_never_started_is_readable(tmp_path):
+    """Ctrl-C between two lines of the start: the bag has the rack's table, memory and sources, and no scan."""
+    rack = build(tmp_path)
+    recorder = Recorder(rack, RackStream(rack, rack.fingerprint), tmp_path / "bag")
+    recorder.close()
+    reader = BagReader(tmp_path / "bag")
+    names = [type(entry.message).__name__ for entry in reader.messages()]
+    assert names[:2] == ["VariableTable", "CommonImage"]
+    assert "Scan" not in names
+    fault = verdict_of(reader).fault
+    assert fault is not None
+    assert fault.code == "AMX6832"
+    with pytest.raises(BagError, match="AMX6832"):
+        replay(tmp_path / "bag")
 
 
 def test_existing_folder_is_refused(tmp_path):
