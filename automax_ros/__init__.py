@@ -21,7 +21,7 @@ _HOMES = {
     "Rack": "rack.rack",
     "RackNodes": "ros.rack_nodes",
     "RackObserver": "rack.base.observers",
-    "Stepper": "scenario.stepping.stepper",
+    "Stepper": "scenario.stepper",
     "StimuliPlayer": "scenario.stimuli.player",
     "Workers": "parallel.job",
     "load": "rackfile.loader",

@@ -25,9 +25,7 @@ from automax_ros.rackfile.model.config import RackConfig, Timing
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.points import Point, grid, read_varied
-from automax_ros.sweep.rack_template import RackTemplate
-from automax_ros.sweep.run import Plan, run_points
-from automax_ros.sweep.sweeping import run_sweep
+from automax_ros.sweep.run import Plan, RackTemplate, run_points, run_sweep
 
 CONFIG = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
 SECONDS, LONG_SECONDS, HOUR_S = 60, 300, 3600

@@ -8,8 +8,7 @@ import pytest
 import yaml
 
 from automax_ros.rackfile.loader import load
-from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.model.driven import driven_plants
+from automax_ros.rackfile.model.config import RackConfig, driven_plants
 
 ROOT = Path(__file__).parents[1]
 RACKS = sorted(

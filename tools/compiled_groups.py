@@ -44,7 +44,6 @@ _SCANS = (
     "runtime/memory/views.py",
     "rack/base/observers.py",
     "rack/tasks/scheduled_task.py",
-    "rack/tasks/statistics.py",
 )
 """Files that each scan uses."""
 _RECORDING = (
@@ -70,8 +69,7 @@ _DRIVES = (
     "rack/modules/drive.py",
     "rack/modules/drive_io.py",
     "rack/modules/io_module.py",
-    "rack/plants/feeding.py",
-    "rack/plants/sampling.py",
+    "rack/plants.py",
 )
 """Files that each interrupt of a 57C406 uses, down to the registers, and the instruments that measure a plant."""
 

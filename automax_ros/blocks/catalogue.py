@@ -15,9 +15,8 @@ from automax_ros.blocks.declare.declaration import Block
 from automax_ros.blocks.discrete.bits import BIT_SELECT, PACK_BITS, UNPACK_BITS
 from automax_ros.blocks.discrete.columns import READ_BITS, READ_WORDS, WRITE_BITS, WRITE_WORDS
 from automax_ros.blocks.discrete.comparison import ALARM, COMPARE
-from automax_ros.blocks.discrete.counter import COUNTER
 from automax_ros.blocks.discrete.logic import AND, LATCH, OR, TRANSITION
-from automax_ros.blocks.discrete.pulse import PULSE_MULT
+from automax_ros.blocks.discrete.pulse import COUNTER, PULSE_MULT
 from automax_ros.blocks.discrete.shift import SHIFT_BITS, SHIFT_WORDS
 from automax_ros.blocks.discrete.tables import FUNCTION, SEARCH
 from automax_ros.blocks.dynamic.filters import DIFF_LAG, LAG, LEAD_LAG

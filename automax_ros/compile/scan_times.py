@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from automax_ros.compile.base.cost import CostModel, Model
 from automax_ros.compile.lowering.basic_statements import WaitingLowering
-from automax_ros.compile.lowering.loops import counts_alone
+from automax_ros.compile.lowering.flow import counts_alone
 from automax_ros.compile.lowering.statements import GOSUB_DEPTH
 from automax_ros.compile.paths import NOTHING, Span, longest_turn, ways_out
 from automax_ros.language.checks.rules.constant_values import constant_value

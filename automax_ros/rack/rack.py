@@ -9,30 +9,31 @@ rack.operations.stop("SPEED")
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+import hashlib
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.names import Element, NameFault
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
+from automax_ros.drive.base.state import SavedState
 from automax_ros.rack.base.local_names import LocalElement
 from automax_ros.rack.base.observers import Observers, RackObserver
 from automax_ros.rack.base.part import RackPart
+from automax_ros.rack.base.stop_cause import OperationsState
 from automax_ros.rack.base.views import backplane_of, view_specs
 from automax_ros.rack.modules.building import build_module
-from automax_ros.rack.modules.module import Module
+from automax_ros.rack.modules.module import Module, ModuleState
 from automax_ros.rack.operations.forces import Force, ForceTable, Target
 from automax_ros.rack.operations.operations import Operations, begin_memory
 from automax_ros.rack.operations.values import ValueOperations
-from automax_ros.rack.plants.feeding import PlantFeeds
-from automax_ros.rack.plants.plants import RackPlants
-from automax_ros.rack.plants.sampling import PlantSampling
-from automax_ros.rack.state import RackState, digest_of
+from automax_ros.rack.plants import PlantFeeds, PlantSampling, RackPlants
 from automax_ros.rack.tasks.installation import Finding, Installation
-from automax_ros.rack.tasks.scheduled_task import ScanEnd, ScheduledTask
+from automax_ros.rack.tasks.scheduled_task import ScanEnd, ScheduledTask, TaskStatistics
 from automax_ros.rack.tasks.services import RackServices
-from automax_ros.rack.tasks.statistics import TaskStatistics
 from automax_ros.rackfile.model.config import RackConfig, Timing
 from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER, WriterSpec, writers_of
@@ -49,10 +50,38 @@ from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, Task
 from automax_ros.runtime.time.scheduler import Scheduler
 
 
+@dataclass(frozen=True)
+class RackState:
+    """All state on which the future of a rack depends, apart from its configuration and sources.
+
+    ``image`` is (view, element, value) of all of memory, ``forced`` the forced elements, ``under_forces`` their values
+    without the forces; ``events`` are kept for the next task that waits. ``modules`` by slot exclude their ``plants``.
+    """
+
+    now_ns: int
+    image: tuple[tuple[int, int, Value], ...]
+    forced: frozenset[tuple[int, int]]
+    events: tuple[str, ...]
+    channels: tuple[Any, ...]
+    operations: OperationsState
+    clock_since_ns: int | None
+    modules: Mapping[int, ModuleState]
+    plants: Mapping[str, SavedState] = field(default_factory=dict)
+    under_forces: tuple[tuple[int, int, Value], ...] = ()
+
+
+def digest_of(text: str, sources: Mapping[str, SourceText]) -> int:
+    """Return a number of 63 bits that a rack's file and its sources determine."""
+    digest = hashlib.sha256(text.encode())
+    for name, source in sorted(sources.items()):
+        digest.update(name.encode() + b"\0" + source.text.encode() + b"\0")
+    return int.from_bytes(digest.digest()[:8], "big") >> 1
+
+
 class Rack:
     """A running rack. ``stopwatch`` (ns, the pacer's clock) measures execution times; without one they count as 0.
 
-    ``execution`` replaces the configured execution of scans in all modules (``scenario/stepping``). ``local`` are the
+    ``execution`` replaces the configured execution of scans in all modules (``scenario/stepper``). ``local`` are the
     slots whose modules are in this process (``rack/base/part``), all if None. ``installation`` has the tasks if they
     are compiled already; ``native`` selects which of them scan as machine code (``compile/native``).
     """

@@ -27,8 +27,7 @@ from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.user_error import UserError
 from automax_ros.language.program import Program
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.model.driven import driven_plants
+from automax_ros.rackfile.model.config import RackConfig, driven_plants
 
 HOME = "common_memory"
 """Name of the process with common memory, as that of its node, also if a lone Processor holds the commons."""

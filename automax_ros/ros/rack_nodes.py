@@ -27,6 +27,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -42,21 +43,23 @@ from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.clock import RackClock
 from automax_ros.ros.base.lifecycle import ACTIVE, INACTIVE, Pending, TransitionRefused
 from automax_ros.ros.base.module_lifecycle import DEACTIVATED, ManagedModuleNode
-from automax_ros.ros.base.node import SIM_TIME, RackContext, follows_clock
+from automax_ros.ros.base.node import SIM_TIME, ModuleNode, RackContext, follows_clock
 from automax_ros.ros.distributed.bus import DistributedMemory, ProcessLayout
+from automax_ros.ros.distributed.forwarding import RequestForwarder, operate_name
 from automax_ros.ros.distributed.presence import PresencePublisher
 from automax_ros.ros.intake.guard import MOST_TOLD
 from automax_ros.ros.intake.intake import MessageIntake
 from automax_ros.ros.intake.rack_lock import RackLock
-from automax_ros.ros.nodes.operator import OperatorNode
+from automax_ros.ros.nodes.common_memory import CommonMemoryNode
+from automax_ros.ros.nodes.operator import OperatorNode, OperatorServices
 from automax_ros.ros.nodes.processor import ProcessorNode
 from automax_ros.ros.nodes.rack import Follower, RackLifecycle, RackNode
 from automax_ros.ros.nodes.registry import nodes_of, run_facts
 from automax_ros.ros.nodes.start_parameters import tune_at_start, without_use
-from automax_ros.ros.operator_sharing import forward_operator
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments, split_arguments
 from automax_ros.ros.setup.environment import RosUnavailable
 from automax_ros.ros.setup.parameter_files import RosArgumentsError
@@ -64,6 +67,22 @@ from automax_ros.ros.setup.process import RosProcess, take_out
 from automax_ros.runtime.health import Health
 from automax_ros.runtime.time.pacer import START_LEAD_NS
 from automax_ros.runtime.time.simulated_pacer import SimulatedTime
+
+
+def forward_operator(nodes: Sequence[ModuleNode], bus: DistributedMemory) -> OperatorServices | None:
+    """Make the operator's node forward requests, or serve forwarded requests if that node is in another process.
+
+    Returns the services created here, to be closed; None if the rack has no operator, or its node closes them.
+    """
+    rack = nodes[0].site.rack
+    memory = next((node for node in nodes if isinstance(node, CommonMemoryNode)), None)
+    for node in nodes:
+        if isinstance(node, OperatorNode) and memory is not None:
+            node.operator_services.forward_by = RequestForwarder(node, bus, memory.offer_files)
+    if rack.part.holds_common_memory or not rack.config.operator:
+        return None
+    return OperatorServices(nodes[0], partial(operate_name, part_name(rack.config, rack.part.slots)))
+
 
 LOOK_S = 0.02
 """Seconds between two checks whether the other processes are present."""

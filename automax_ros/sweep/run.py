@@ -1,18 +1,27 @@
-"""One run of a sweep: a new rack in simulated time, from its values to its measures."""
+"""The runs of a sweep: each a new rack in simulated time, from its values to its measures."""
 
 from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
+from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import Severity
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.user_error import UserError
+from automax_ros.parallel.job import Job, JobResult, Workers
+from automax_ros.parallel.run import run_jobs
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks.installation import Installation
+from automax_ros.rackfile.loader import load_stored
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.plant_numbers import PlantNumber, with_numbers
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.scenario.stimuli.player import StimuliPlayer
@@ -20,8 +29,54 @@ from automax_ros.scenario.stimuli.reader import MOST_BYTES, read_for_rack
 from automax_ros.sweep.measures import FUNCTIONS, Measure, Subject
 from automax_ros.sweep.points import Point
 from automax_ros.sweep.quantities import Beginning, Quantity
-from automax_ros.sweep.rack_template import RackTemplate
 from automax_ros.sweep.watching import Watch
+
+
+@dataclass(frozen=True)
+class RackTemplate:
+    """A rack file's text and path, and the sources of the tasks by name: no file is read again.
+
+    ``native`` selects which tasks scan as machine code, which changes no result.
+    """
+
+    text: str
+    path: str
+    sources: tuple[tuple[str, SourceText], ...]
+    native: NativeForms = IN_PYTHON
+
+    @classmethod
+    def of(cls, rack: Rack, native: NativeForms = IN_PYTHON) -> RackTemplate:
+        """Return the template of a rack as it is installed."""
+        return cls(rack.config.text, str(rack.config.path), tuple(rack.sources.items()), native)
+
+    def prepare(self) -> None:
+        """Compile the tasks, so that copies of this process need not."""
+        _installation(self)
+
+    def rack(self, plants: Mapping[PlantNumber, str]) -> Rack:
+        """Return a new rack with some other numbers of its plants.
+
+        Raises:
+            UserError: with these numbers the rack file has errors.
+        """
+        config = _config(self.text, self.path, tuple(plants.items()))
+        return Rack(config, installation=_installation(self).again(config))
+
+
+@lru_cache(maxsize=1)
+def _config(text: str, path: str, numbers: tuple[tuple[PlantNumber, str], ...] = ()) -> RackConfig:
+    result = load_stored(SourceText(path, with_numbers(text, dict(numbers))), Path(path))
+    if result.config is None:
+        first = next(item for item in result.diagnostics if item.severity is Severity.ERROR)
+        raise UserError(first.message, first.hint, code=first.code)
+    return result.config
+
+
+@lru_cache(maxsize=1)
+def _installation(blueprint: RackTemplate) -> Installation:
+    config = _config(blueprint.text, blueprint.path)
+    return Installation(config, sources=dict(blueprint.sources), native=blueprint.native)
+
 
 _SLICE_NS = 100 * NS_PER_MS
 """Rack time after which the write log is read, which grows meanwhile."""
@@ -155,3 +210,77 @@ def _digest(path: Path) -> str:
         return hashlib.sha256(read_bytes(path, MOST_BYTES)).hexdigest()
     except FileFault as fault:
         raise UserError(f"the stimuli file {path} {fault}") from fault
+
+
+_PIECES_EACH = 8
+"""Pieces per process (decision): so that all end at about the same time."""
+_CLUSTER_PIECES = 256
+"""Pieces for a cluster, whose size is not known (decision)."""
+_MOST_IN_PIECE = 50
+"""Most runs of a piece (decision): those that are lost with a worker."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A run: its number from 1 on, its values, its outcome."""
+
+    number: int
+    point: Point
+    outcome: Outcome
+
+
+def run_sweep(
+    plan: Plan,
+    points: Sequence[Point],
+    where: Workers,
+    on_rows: Callable[[list[Row]], None] = lambda _: None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> list[Row]:
+    """Run all points; return a row for each in their order, or fewer if ``should_stop`` ended it early.
+
+    ``on_rows`` receives rows as they come, in any order. A row depends on nothing but the plan and its point.
+
+    Raises:
+        ClusterFault: the cluster cannot be used.
+    """
+    size = _size(len(points), where)
+    pieces = [_piece(plan, points, first, size) for first in range(0, len(points), size)]
+    firsts = {piece.name: number * size for number, piece in enumerate(pieces)}
+
+    def rows_of(done: JobResult) -> list[Row]:
+        return list(_rows(done, firsts[done.piece.name]))
+
+    if where.scheduler is None:
+        plan.blueprint.prepare()
+    found = run_jobs(pieces, where, lambda done: on_rows(rows_of(done)), should_stop)
+    return [row for done in found for row in rows_of(done)]
+
+
+def _size(count: int, where: Workers) -> int:
+    if where.scheduler is None and where.processes == 1:
+        return 1
+    pieces = _CLUSTER_PIECES if where.scheduler is not None else where.processes * _PIECES_EACH
+    return max(1, min(_MOST_IN_PIECE, count // pieces))
+
+
+def _piece(plan: Plan, points: Sequence[Point], first: int, size: int) -> Job:
+    some = tuple(points[first : first + size])
+    name = f"run {first + 1}" if len(some) == 1 else f"runs {first + 1} to {first + len(some)}"
+    return Job(name, run_points, (plan, some))
+
+
+def _rows(done: JobResult, first: int) -> Iterable[Row]:
+    plan, points = done.piece.arguments
+    outcomes = done.result
+    if outcomes is None:
+        outcomes = [Outcome((None,) * len(plan.measures), str(done.fault))] * len(points)
+    for number, (point, outcome) in enumerate(zip(points, outcomes, strict=True), start=first + 1):
+        yield Row(number, point, outcome)
+
+
+def best_rows(rows: Sequence[Row], measure: int, *, greatest: bool = False) -> list[Row]:
+    """Return the rows without a fault that have a measure, the best first; of equal ones the earlier first."""
+    sign = -1 if greatest else 1
+    found = ((row.outcome.measures[measure], row) for row in rows if not row.outcome.fault)
+    known = [(sign * value, row.number, row) for value, row in found if value is not None]
+    return [row for _, _, row in sorted(known, key=lambda item: item[:2])]

@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from automax_ros.core.safe_file import atomic_write, open_at_once
-from automax_ros.sweep.run import Plan
-from automax_ros.sweep.sweeping import Row
+from automax_ros.sweep.run import Plan, Row
 
 RUN, FAULT, REPEAT = "run", "fault", "repeat"
 _EPOCH = (1980, 1, 1, 0, 0, 0)

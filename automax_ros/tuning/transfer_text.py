@@ -14,7 +14,7 @@ _TRUE_DIGITS = 1e-5
 """Most deviation of the response of the rounded coefficients, as a share."""
 
 
-def number(value: float, digits: int = 6) -> str:
+def number_text(value: float, digits: int = 6) -> str:
     """Return a number with at most this many digits, with an exponent only if it is very large or small."""
     return f"{value:.{digits}g}"
 
@@ -42,8 +42,8 @@ def _is_enough(transfer: Transfer, at_rad_s: Sequence[float], digits: int) -> bo
     rounded = Transfer(
         transfer.numerator,
         transfer.denominator,
-        tuple(float(number(value, digits)) for value in transfer.b),
-        tuple(float(number(value, digits)) for value in transfer.a),
+        tuple(float(number_text(value, digits)) for value in transfer.b),
+        tuple(float(number_text(value, digits)) for value in transfer.a),
         transfer.period_s,
         transfer.mapping,
     )
@@ -64,7 +64,7 @@ def _polynomial(factors: Sequence[float], digits: int) -> str:
             continue
         power = "" if place == 0 else " z**-1" if place == 1 else f" z**-{place}"
         size = abs(factor)
-        text = power.strip() if size == 1.0 and power else number(size, digits) + power
+        text = power.strip() if size == 1.0 and power else number_text(size, digits) + power
         terms.append((" - " if factor < 0.0 else " + ") + text if terms else ("-" if factor < 0.0 else "") + text)
     return "".join(terms) or "0"
 

@@ -12,8 +12,7 @@ from mcap.writer import Writer as McapWriter
 from recordings.live_racks import build
 from recordings.mutations import CHANGES, mutants
 
-from automax_ros.cli.recordings.bag_info import as_data
-from automax_ros.cli.recordings.bag_info_text import lines_of
+from automax_ros.cli.recordings.bag_info import as_data, lines_of
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.recordings.info.info import bag_info

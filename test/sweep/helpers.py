@@ -7,8 +7,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.points import read_varied
-from automax_ros.sweep.rack_template import RackTemplate
-from automax_ros.sweep.run import Plan, Stimuli
+from automax_ros.sweep.run import Plan, RackTemplate, Stimuli
 
 RACK = """\
 rack: PM1

@@ -11,8 +11,7 @@ from automax_ros.parallel.job import Workers
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.sweep.points import grid, read_varied
-from automax_ros.sweep.run import Outcome, Stimuli, run_point, run_points
-from automax_ros.sweep.sweeping import best_rows, run_sweep
+from automax_ros.sweep.run import Outcome, Stimuli, best_rows, run_point, run_points, run_sweep
 from sweep.helpers import plan_of, rack_in
 
 DRIVE = Path(__file__).parents[2] / "config" / "dc_drive" / "rack.yaml"

@@ -9,8 +9,7 @@ from parallel.clusters import cluster
 
 from automax_ros.parallel.job import Workers
 from automax_ros.sweep.points import grid, read_varied
-from automax_ros.sweep.run import Stimuli
-from automax_ros.sweep.sweeping import run_sweep
+from automax_ros.sweep.run import Stimuli, run_sweep
 from sweep.helpers import plan_of, rack_in
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.sweep.measures import read_measures
-from automax_ros.sweep.rack_template import RackTemplate
+from automax_ros.sweep.run import RackTemplate
 from automax_ros.sweep.watching import Watch
 from sweep.helpers import rack_in
 

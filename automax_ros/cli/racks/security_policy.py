@@ -75,8 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _enclaves(arguments: argparse.Namespace, config: RackConfig) -> Sequence[Enclave]:
-    from automax_ros.ros.security.interfaces import enclave_of_rack, enclaves_of_seats
-    from automax_ros.ros.security.profiles import operator_of, recorder_of
+    from automax_ros.ros.security.profiles import enclave_of_rack, enclaves_of_seats, operator_of, recorder_of
 
     ros = ros_arguments(arguments)
     rack = (

@@ -14,15 +14,14 @@ from pathlib import Path
 
 from automax_ros.cli.options.rack import add_outside_argument, add_set_argument, config_of, print_refused, settings_of
 from automax_ros.cli.options.stimuli import StimuliRefused, stimulation
-from automax_ros.cli.racks.step_commands import completions, execute
-from automax_ros.cli.racks.step_session import Session, place_text
+from automax_ros.cli.racks.step_session import Session, completions, execute, place_text
 from automax_ros.cli.shell.prompt import Interrupt, edit_lines, typed_lines
 from automax_ros.core.text import printable
 from automax_ros.core.user_error import UserError
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import Timing
-from automax_ros.scenario.stepping.stepper import Stepper
+from automax_ros.scenario.stepper import Stepper
 
 PROMPT = "step> "
 

@@ -35,9 +35,7 @@ from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.sweep.measures import FUNCTIONS, read_measures
 from automax_ros.sweep.points import Point, Varied, grid, read_varied, sample
-from automax_ros.sweep.rack_template import RackTemplate
-from automax_ros.sweep.run import Plan, Stimuli, run_point
-from automax_ros.sweep.sweeping import Row, run_sweep
+from automax_ros.sweep.run import Plan, RackTemplate, Row, Stimuli, run_point, run_sweep
 from automax_ros.sweep.tables import records
 
 _T = TypeVar("_T")

@@ -274,9 +274,10 @@ class _Session:
             print(recording.failure, file=sys.stderr)
             return 1
         self._line.message(f"recorded {folder}: {recorded_size(folder)}")
-        empty = self._expects_scans and not recording.scans
+        empty = self._expects_scans and not recording.executable
         if empty and recording.first_stamp is not None:
-            self._line.message("  it holds no scan: nothing of it can be replayed; do the tasks run?")
+            which = "scan that can be executed again" if recording.scans else "scan"
+            self._line.message(f"  it holds no {which}: nothing of it can be replayed; do the tasks run?")
         return 1 if recording.ended is not None or recording.first_stamp is None or empty else 0
 
 

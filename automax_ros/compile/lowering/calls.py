@@ -29,9 +29,8 @@ from automax_ros.blocks.declare.declaration import (
 )
 from automax_ros.blocks.discrete.shift import STRUCTURE_STATES
 from automax_ros.compile.base import build
-from automax_ros.compile.base.emitter import Emitter
+from automax_ros.compile.base.emitter import Emitter, forced_name, latched_name, structure_prefix, variable_name
 from automax_ros.compile.base.layout import Role, StateField
-from automax_ros.compile.base.pynames import forced_name, latched_name, structure_prefix, variable_name
 from automax_ros.compile.blocks.coefficients import CoefficientFunction, kept_names, quick_form
 from automax_ros.compile.blocks.folding import TableReader, value_of
 from automax_ros.compile.blocks.inline import Binding, Inlined, inline, log_in_place, names_in

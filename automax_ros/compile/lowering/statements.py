@@ -18,12 +18,16 @@ from automax_ros.compile.lowering.flow import (
     PC,
     STEPS,
     Flow,
+    Loop,
     before_end,
+    begin_loop,
     count_statements,
+    end_turn,
     is_jumping,
     jump_targets,
+    loop_fields,
+    loop_test,
 )
-from automax_ros.compile.lowering.loops import Loop, begin_loop, end_turn, loop_fields, loop_test
 from automax_ros.compile.lowering.stores import printable, store
 from automax_ros.core.types import DataType
 from automax_ros.language.tree.tree import (

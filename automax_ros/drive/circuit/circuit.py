@@ -16,8 +16,7 @@ from automax_ros.drive.base.motor import Machine
 from automax_ros.drive.base.state import SavedState, check_names
 from automax_ros.drive.circuit.ac_line import AcLine
 from automax_ros.drive.circuit.bridge import Bridge
-from automax_ros.drive.circuit.conduction import Conduction
-from automax_ros.drive.circuit.events import CircuitEvent, EventKind
+from automax_ros.drive.circuit.conduction import CircuitEvent, Conduction, EventKind
 from automax_ros.drive.circuit.meter import Sample
 from automax_ros.drive.circuit.network import Network, Phases
 from automax_ros.drive.circuit.scr import BIT, mask_of, numbers_of

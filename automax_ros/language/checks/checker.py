@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from automax_ros.blocks.declare.declaration import Block, Platform
-from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
+from automax_ros.core.diagnostics import Diagnostic, Note, SourceText, Span, has_errors, in_order
 from automax_ros.core.ticks import DEFAULT_TICK_NS
 from automax_ros.language.checks.calls.calls import check_call, check_scan_loop, event_name
 from automax_ros.language.checks.calls.data_structures import find_structures
-from automax_ros.language.checks.calls.sharing import check_sharing
 from automax_ros.language.checks.rules.basic_statements import check_waiting, find_files
 from automax_ros.language.checks.rules.context import Context, broken_lines
 from automax_ros.language.checks.rules.declarations import check_declarations, check_storage
@@ -24,6 +23,43 @@ from automax_ros.language.program import BoundCall, CommonSpec, Program
 from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
 from automax_ros.language.tree.task_kind import TaskKind, kind_of_source
 from automax_ros.language.tree.tree import Call, Declaration, Module, Read, Statement
+from automax_ros.language.tree.walk import arguments_of, expressions_of, variables_in
+
+Use = tuple[Span, "int | None"]
+
+
+def check_sharing(context: Context, layout: TaskLayout) -> None:
+    """Warn once for every latched common that blocks and BASIC statements of the scan both use.
+
+    Statements before SCAN_LOOP do not count: they run before the first latch, and the manual places them there.
+    """
+    by_blocks: dict[str, Use] = {}
+    by_basic: dict[str, Use] = {}
+    for statement, line, after in layout.numbered():
+        if not after:
+            continue
+        if isinstance(statement, Call):
+            expressions = tuple(argument.value for argument in arguments_of(statement))
+            uses = by_blocks
+        else:
+            expressions, uses = expressions_of(statement), by_basic
+        for expression in expressions:
+            for variable in variables_in(expression):
+                uses.setdefault(variable.name, (variable.span, line))
+    for name, (span, line) in by_basic.items():
+        symbol = context.symbols.get(name)
+        if symbol is None or not symbol.latched or name not in by_blocks:
+            continue
+        block_span, block_line = by_blocks[name]
+        context.line = line
+        context.report(
+            "AMX4086",
+            f"{name} is used by BASIC in line {line} and by a block in line {block_line}",
+            span,
+            "blocks see the value latched at the start of the scan, BASIC the present one (3.3)",
+            (Note("the block is here", block_span),),
+        )
+
 
 AUTOMAX = Platform.AUTOMAX
 _TOO_LARGE, _TOO_MANY, _UTF_16 = "AMX0001", "AMX0002", "AMX0006"

@@ -1,4 +1,4 @@
-"""The plants of a running rack as messages, at the rate at which the rack samples them (``rack/plants/sampling``).
+"""The plants of a running rack as messages, at the rate at which the rack samples them (``rack/plants``).
 
 A plant is only metered (means, energies) if a sink takes its messages: metering costs time, and changes nothing else.
 """
@@ -14,7 +14,7 @@ from automax_ros.messages.cdr.cdr import encoder
 from automax_ros.messages.types.messages import NAMES, Header, JointState, PlantState
 from automax_ros.messages.types.topics import PLANT, Take, Takes, Topic
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.model.driven import DrivenPlant
+from automax_ros.rackfile.model.config import DrivenPlant
 from automax_ros.rackfile.model.ros_names import JOINTS, plant_topic
 
 NOT_METERED = Energies(nan, nan, nan, nan)

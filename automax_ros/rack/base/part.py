@@ -10,8 +10,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.model.driven import DrivenPlant, driven_plants
+from automax_ros.rackfile.model.config import DrivenPlant, RackConfig, driven_plants
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.plants import PlantConfig
 from automax_ros.runtime.memory.memory import CommonMemory

@@ -12,8 +12,7 @@ from automax_ros.messages.stream.rack_messages import SCALED_TYPE, topic_type_na
 from automax_ros.messages.types.messages import NAMES, JointState, PlantState, Variable, VariableTable
 from automax_ros.messages.types.rack_files import RACK_FILE, RackFile, fingerprint
 from automax_ros.messages.types.topics import LATCHED, OPERATION, PLANT, SCAN, VALUE, QosProfile
-from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.model.driven import driven_plants
+from automax_ros.rackfile.model.config import RackConfig, driven_plants
 from automax_ros.rackfile.model.ros_names import JOINTS, plant_topic, topic_names
 
 MAX_VALUE_TOPICS = 2000

@@ -1,9 +1,12 @@
-"""Progress of a live recording for each task, and gaps by lost messages."""
+"""Messages of a live recording in the order of sending, its progress for each task, and gaps by lost messages."""
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections import deque
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from operator import itemgetter
+from typing import Any, Generic, Protocol, TypeVar
 
 from automax_ros.messages.cdr.cdr import CdrError, decode
 from automax_ros.messages.cdr.message_headers import ScanHead, StateHead, scan_head, state_head
@@ -122,3 +125,52 @@ def has_written(payload: bytes, last_write: int) -> bool:
     except CdrError:
         return False
     return bool(scan.committed.variable or (scan.written.variable and last_write <= scan.stamp))
+
+
+Item = TypeVar("Item")
+_SENT = itemgetter(0)
+
+
+class SendOrder(Generic[Item]):
+    """Sorts messages received on several topics into the order in which they were sent.
+
+    A rack sends all its messages from one thread, each with the time of sending. A message is held until ``hold_ns``
+    have passed on the local clock since one that was sent later was received.
+    Times of sending are compared only with each other, and so are local times: the clocks may differ.
+    """
+
+    def __init__(self, hold_ns: int) -> None:
+        self._hold_ns = hold_ns
+        self._waiting: list[tuple[int, Item]] = []
+        self._marks: deque[tuple[int, int]] = deque()
+        self._newest = 0
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def add(self, sent_ns: int, item: Item) -> None:
+        """Add a message that was sent at a time of the sender's clock."""
+        self._waiting.append((sent_ns, item))
+        self._newest = max(self._newest, sent_ns)
+
+    def due(self, now_ns: int) -> list[tuple[int, Item]]:
+        """Return (time of sending, message) of the messages that need not be held longer, in order.
+
+        ``now_ns`` is the local time at which the reading of the topics began that received the messages added last.
+        """
+        self._marks.append((now_ns, self._newest))
+        mark = -1
+        while self._marks and self._marks[0][0] <= now_ns - self._hold_ns:
+            mark = self._marks.popleft()[1]
+        if mark < 0 or not self._waiting:
+            return []
+        self._waiting.sort(key=_SENT)
+        end = bisect_right(self._waiting, mark, key=_SENT)
+        found, self._waiting = self._waiting[:end], self._waiting[end:]
+        return found
+
+    def rest(self) -> list[tuple[int, Item]]:
+        """Return all held messages, in order."""
+        found = sorted(self._waiting, key=_SENT)
+        self._waiting = []
+        return found

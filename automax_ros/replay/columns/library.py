@@ -6,7 +6,7 @@ Where it is not wanted, does not pay or cannot be built, a replay goes scan by s
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,11 +16,85 @@ import numpy as np
 from numpy.typing import NDArray
 
 from automax_ros.messages.cdr.cdr import MAX_TRAILING
-from automax_ros.messages.cdr.fields import MACROS, FieldsSource, fields_source
+from automax_ros.messages.cdr.parts import CODES, size_of
+from automax_ros.messages.types.definitions import TIME, Field, message_types, short_name
 from automax_ros.messages.types.messages import NAMES, CommonWrite, Scan
 from automax_ros.recordings.mcap.chunk_table import MESSAGE_HEAD, MOST_MESSAGES, ChunkTable, definition_at
 from automax_ros.recordings.mcap.unpacking import Buffer
 from automax_ros.replay.columns.entries import Entries, Ints, ValueRules
+
+MACROS = (Path(__file__).parent / "cdr_fields.h").read_text(encoding="utf-8")
+"""The macros, which must precede the generated functions once."""
+_TYPES = {"?": "uint8_t", "B": "uint8_t", "b": "int8_t", "H": "uint16_t", "h": "int16_t", "I": "uint32_t"}
+_TYPES |= {"i": "int32_t", "Q": "uint64_t", "q": "int64_t"}
+
+
+@dataclass(frozen=True)
+class FieldsSource:
+    """A C function ``function`` that finds the fields of a type.
+
+    ``numbers`` are the names of single numbers and times (ns), ``lists`` those of texts and sequences, in their order;
+    fields of a nested message have its name and a dot as prefix. No length is trusted: a message whose fields do not
+    lie within its bytes is reported as one that does not fit, and so is one that only the scalar decoder can check.
+    """
+
+    function: str
+    text: str
+    numbers: tuple[str, ...]
+    lists: tuple[str, ...]
+
+
+def fields_source(type_name: str) -> FieldsSource:
+    """Return the function of a type.
+
+    Raises:
+        TypeError: the type has fields that these functions cannot find.
+    """
+    numbers: list[str] = []
+    lists: list[str] = []
+    lines = list(_lines(type_name, "", numbers, lists))
+    function = f"automax_find_{short_name(type_name).rpartition('/')[2]}"
+    head = f"FIND({function},"
+    return FieldsSource(function, "\n".join((head, *lines, ")")), tuple(numbers), tuple(lists))
+
+
+def _lines(type_name: str, prefix: str, numbers: list[str], lists: list[str]) -> Iterator[str]:
+    for field in message_types()[type_name].definition.fields:
+        name = prefix + field.name
+        if field.kind not in CODES and field.kind not in (TIME, "string") and not field.array:
+            yield from _lines(field.kind, f"{name}.", numbers, lists)
+        elif field.kind == "string" and field.array:
+            yield "    TEXTS()"
+        elif field.array or field.kind == "string":
+            macro = "TEXT" if field.kind == "string" else "LIST"
+            yield f"    {macro}({len(lists)}, {_item_bytes(field)})"
+            lists.append(name)
+        else:
+            yield f"    {_number(field)} /* {name} */".replace("#", str(len(numbers)))
+            numbers.append(name)
+
+
+def _number(field: Field) -> str:
+    if field.kind == TIME:
+        return "TIME(#)"
+    code = CODES[field.kind]
+    if code not in _TYPES:
+        raise TypeError(f"{field.name} is not a whole number")
+    return f"NUMBER(#, {_TYPES[code]})"
+
+
+def _item_bytes(field: Field) -> str:
+    if field.kind == "string":
+        return "1, 1"
+    if field.kind in CODES:
+        return f"{size_of(CODES[field.kind])}, {size_of(CODES[field.kind])}"
+    members = message_types()[field.kind].definition.fields
+    sizes = {size_of(CODES[member.kind]) for member in members if member.kind in CODES and not member.array}
+    if len(sizes) != 1 or any(member.array or member.kind not in CODES for member in members):
+        raise TypeError(f"the items of {field.name} are not numbers of one size")
+    (size,) = sizes
+    return f"{size}, {size * len(members)}"
+
 
 Bytes = NDArray[np.uint8]
 

@@ -12,10 +12,9 @@ from automax_ros.language.tree.tree import Direction
 from automax_ros.messages.types.messages import Scan
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.recordings.read.common_log import Entry, Key
-from automax_ros.replay.scans.channels import CHANNELS
 from automax_ros.replay.scans.commons import RecordedCommons
 from automax_ros.replay.scans.compare import DifferenceCounts, Found, Label, Seen, within
-from automax_ros.replay.scans.inputs import ScanMemory
+from automax_ros.replay.scans.inputs import CHANNELS, ScanMemory
 from automax_ros.replay.scans.report import Kind, NamedValue, errors_text
 from automax_ros.replay.scans.stored_rack import ReplaySource
 from automax_ros.runtime.scan.drive_record import COMMAND_VIEW, MEASURED_NAMES, MEASURED_VIEW

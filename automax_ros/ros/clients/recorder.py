@@ -28,9 +28,9 @@ from automax_ros.messages.types.messages import Presence, VariableTable
 from automax_ros.messages.types.rack_files import RackFile, RackFilesError, files_from_text
 from automax_ros.messages.types.topics import LATCHED, SCAN
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.recordings.live.arrival import SendOrder
 from automax_ros.recordings.live.recording import LiveRecording
 from automax_ros.recordings.live.topics import LiveTopics, TopicKind
+from automax_ros.recordings.live.tracks import SendOrder
 from automax_ros.recordings.write.data_file import StorageOptions
 from automax_ros.ros.base.qos import message_class
 from automax_ros.ros.clients.recorded_run import MOST_TABLES, RecordedRun, participant

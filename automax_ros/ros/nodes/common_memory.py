@@ -7,7 +7,7 @@ each variable with ``ros: out`` or ``ros: in``.
 
 Subscribes: ``common/NAME/set`` (std_msgs) for each variable with ``ros: in``, and for no other;
 ``JOINT_velocity_controller/commands`` and ``JOINT_effort_controller/commands`` (std_msgs/Float64MultiArray) where a
-plant's joint is commanded (``ros/nodes/joint_commands.py``).
+plant's joint is commanded.
 """
 
 from __future__ import annotations
@@ -23,13 +23,42 @@ from automax_ros.core.types import Value
 from automax_ros.messages.types.rack_files import RackFile, files_of, files_text
 from automax_ros.messages.types.topics import LATCHED, Take, Topic
 from automax_ros.rackfile.model.config import CommonVariable
-from automax_ros.rackfile.model.ros_names import set_topic
+from automax_ros.rackfile.model.plants import JointCommand
+from automax_ros.rackfile.model.ros_names import command_topic, set_topic
+from automax_ros.rackfile.sections.joints import INTERFACES, UNITS
 from automax_ros.ros.base.node import MAIN_NODE, ModuleNode, RackContext
 from automax_ros.ros.base.qos import ros_qos
 from automax_ros.ros.base.rack_health import RackHealth
 from automax_ros.ros.base.write_topic import ScaledWriter, subscribe_variable
-from automax_ros.ros.nodes.joint_commands import subscribe_joint
 from automax_ros.runtime.memory.views import MemoryValueError
+
+TYPE = "std_msgs/msg/Float64MultiArray"
+MOST_BYTES = 1024
+"""Longest message that is read, bytes: one number, and a layout with its names (decision)."""
+
+
+def subscribe_joint(node: ModuleNode, command: JointCommand) -> None:
+    """Subscribe a node to the commands of one joint, in rad/s or N m, as ros2_control's group controllers receive them.
+
+    A command writes the common that the rack file names, between two scans, as the writer ``ros``. The last command
+    stays in force when a controller disappears (decision: so do forward_command_controller and every other ``/set``).
+    """
+    config, interface = node.site.rack.config, command.interface
+    view = next(view for view, variable in enumerate(config.variables) if variable.name == command.common)
+    topic = f"/{config.namespace}/{command_topic(command.joint, interface)}"
+    scaled = None
+    if command.scale:
+        scaled = ScaledWriter(node, topic, config.variables[view], command.scale, UNITS[interface])
+
+    def elements_of(message: Any) -> list[tuple[int, Value]]:
+        if len(message.data) != 1:
+            joint = f"{interface} of {command.joint}"
+            raise MemoryValueError(f"{joint} is one number, the message has {len(message.data)}")
+        value = message.data[0] / INTERFACES[interface]
+        return [(0, value if scaled is None else scaled.counts(value))]
+
+    subscribe_variable(node, topic, TYPE, view, elements_of, MOST_BYTES)
+
 
 _NUMBER_BYTES = 8
 _LAYOUT_BYTES = 1024

@@ -18,7 +18,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.operator.switches import SwitchOperations
-from automax_ros.rackfile.model.driven import DrivenPlant
+from automax_ros.rackfile.model.config import DrivenPlant
 from automax_ros.rackfile.model.ros_names import load_topic
 from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.write_topic import WriteTopic

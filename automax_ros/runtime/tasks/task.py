@@ -11,6 +11,7 @@ from automax_ros.compile.base.scan_io import ScanTooLong, StateValues
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.types import Value
+from automax_ros.language.program import tunable_value
 from automax_ros.language.tree.tree import Scope
 from automax_ros.runtime.memory.image import Image
 from automax_ros.runtime.memory.registers import NO_MODULES, Backplane
@@ -22,7 +23,6 @@ from automax_ros.runtime.scan.events import Events
 from automax_ros.runtime.scan.scan_in_progress import Begun, Progress, ReplayableReads, ScanInProgress
 from automax_ros.runtime.scan.scan_record import ScanRecord, Status, Steps
 from automax_ros.runtime.scan.task_io import OutcomeOf, RecordingIo, ScanMemory, TaskIo, at_once
-from automax_ros.runtime.scan.tunable_value import tunable_value
 from automax_ros.runtime.tasks.modeled_scan import scan_in_steps
 
 __all__ = ["EVENT_TIMEOUT", "OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task"]

@@ -10,7 +10,7 @@ import sys
 import time
 
 import pytest
-from scenario.stepping.test_stepper import DRAW, RACK, SPEED
+from scenario.test_stepper import DRAW, RACK, SPEED
 
 from cli.support import Result
 

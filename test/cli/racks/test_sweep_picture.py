@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 from sweep.helpers import plan_of, rack_in
 
-from automax_ros.cli.racks import sweep_picture
+from automax_ros.cli.racks import sweep_output
 from automax_ros.core.user_error import UsageError
 from automax_ros.sweep.points import grid, read_varied, sample
-from automax_ros.sweep.run import Outcome, Plan
-from automax_ros.sweep.sweeping import Row
+from automax_ros.sweep.run import Outcome, Plan, Row
 
 
 @pytest.fixture
 def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Draw rows of two measures, the sum of the values and none, and give the figure; None where none is drawn."""
     figures: list[Any] = []
-    monkeypatch.setattr(sweep_picture, "save", lambda figure, _: figures.append(figure))
+    monkeypatch.setattr(sweep_output, "save", lambda figure, _: figures.append(figure))
     rack = rack_in(tmp_path)
 
     def call(texts: list[str], count: int = 0, measures: str = "rms(ERR%) max(ERR%)") -> tuple[Any, list[Row], Plan]:
@@ -31,7 +30,7 @@ def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
             Row(number, point, Outcome((one, None)))
             for number, (point, one) in enumerate(zip(points, sums, strict=True), 1)
         ]
-        sweep_picture.draw(plan, rows, rows[:1], tmp_path / "picture.png")
+        sweep_output.draw(plan, rows, rows[:1], tmp_path / "picture.png")
         return (figures[-1] if figures else None), rows, plan
 
     return call

@@ -14,7 +14,7 @@ from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.cli.main import main
 from automax_ros.cli.options.task import Target, check_task_file
 from automax_ros.cli.output.csv_input import MAX_LINE, CsvFault
-from automax_ros.cli.tasks.trace_rows import InputTable
+from automax_ros.cli.tasks.trace import InputTable
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 from cli.support import TASK, table_of

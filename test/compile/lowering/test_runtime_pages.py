@@ -49,11 +49,11 @@ def test_what_the_runtime_logs_has_a_page():
     from automax_ros.blocks.declare import declaration
     from automax_ros.compile.base import functions
     from automax_ros.compile.lowering import basic_statements as waiting
-    from automax_ros.compile.lowering import expressions, loops, statements
+    from automax_ros.compile.lowering import expressions, flow, statements
     from automax_ros.runtime.scan import channels
     from automax_ros.runtime.tasks import task
 
-    modules = (declaration, expressions, functions, loops, statements, waiting, channels, task)
+    modules = (declaration, expressions, functions, flow, statements, waiting, channels, task)
     numbers = {value for module in modules for value in vars(module).values() if isinstance(value, int)}
     logged = {f"AMX{number}" for number in numbers if 7000 <= number < 8000}
     assert logged <= set(CODES)

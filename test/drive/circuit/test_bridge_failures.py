@@ -9,7 +9,7 @@ from automax_ros.drive.base.motor import FixedLoad
 from automax_ros.drive.circuit.ac_line import AcLine
 from automax_ros.drive.circuit.bridge import Bridge
 from automax_ros.drive.circuit.circuit import Circuit
-from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.circuit.conduction import EventKind
 from automax_ros.drive.circuit.scr import FORWARD, PARTNER, REVERSE
 from drive.support import circuit_of, fire_all, plan
 

@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.circuit.conduction import EventKind
 from drive.support import circuit_of, currents_at, fire_all, oracle_gates, oracle_of, plan
 
 WINDOW_NS = 1e9 / 360

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.circuit.conduction import EventKind
 from automax_ros.drive.plant.plant import DROP_OUT_NS
 from drive.current_loop.support import Bench
 

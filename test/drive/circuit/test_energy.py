@@ -10,7 +10,7 @@ from automax_ros.drive.base.nameplate import EXAMPLES, derive
 from automax_ros.drive.circuit.ac_line import AcLine
 from automax_ros.drive.circuit.bridge import Bridge
 from automax_ros.drive.circuit.circuit import Circuit
-from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.circuit.conduction import EventKind
 from automax_ros.drive.circuit.firing import ConstantAlpha
 from drive.support import circuit_of, fire_all, oracle_gates, plan
 from drive.switched import Switched

@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from automax_ros.drive.assess.limits import largest_inductance_mh
-from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.circuit.conduction import EventKind
 from automax_ros.drive.current_loop.bridge_change import FLOOR, BridgeChange, Stage, preset_us
 from automax_ros.drive.current_loop.signals import OVERCURRENT, VOLTAGE, VOLTS, Measured, gate_numbers
 from drive.current_loop.support import Bench, parameters_of

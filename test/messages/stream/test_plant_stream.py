@@ -18,7 +18,7 @@ from automax_ros.messages.stream.plant_stream import state_message
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.messages.types.topics import PLANT
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.model.driven import driven_plants
+from automax_ros.rackfile.model.config import driven_plants
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 YAML = """\

@@ -9,8 +9,7 @@ import pytest
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.drive.pmi import registers as table
-from automax_ros.rack.rack import Rack
-from automax_ros.rack.state import RackState
+from automax_ros.rack.rack import Rack, RackState
 from rack.helpers import rack_at, run_for
 from rack.modules.pmi_racks import CURRENT, IDLE, SPEED_LOOP, breaks, built, rpm, started, winder
 

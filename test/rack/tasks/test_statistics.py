@@ -12,7 +12,7 @@ from recordings.live_racks import build
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.tasks.statistics import TaskStatistics
+from automax_ros.rack.tasks.scheduled_task import TaskStatistics
 from automax_ros.runtime.time.pacer import Pacer
 
 YAML = """\

@@ -14,8 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer as McapWriter
 
-from automax_ros.cli.recordings.bag_info import as_data
-from automax_ros.cli.recordings.bag_info_text import lines_of
+from automax_ros.cli.recordings.bag_info import as_data, lines_of
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.messages.types.messages import Int16, Scan, ScanError

@@ -25,8 +25,8 @@ from automax_ros.messages.types.rack_files import (
     fingerprint,
 )
 from automax_ros.messages.types.topics import LATCHED
-from automax_ros.recordings.live.arrival import SendOrder
 from automax_ros.recordings.live.topics import MAX_VALUE_TOPICS, LiveTopics
+from automax_ros.recordings.live.tracks import SendOrder
 from automax_ros.recordings.mcap.channels import MAX_DEPTH, MAX_QOS_BYTES, STREAM, recorded_qos
 from recordings.live_racks import build
 from recordings.recordings import TABLE, messages

@@ -13,8 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.cli.output.figure import Layout, figure_of
-from automax_ros.cli.recordings.bag_info import as_data
-from automax_ros.cli.recordings.bag_info_text import lines_of
+from automax_ros.cli.recordings.bag_info import as_data, lines_of
 from automax_ros.recordings.info.info import bag_info, task_facts
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.tables import series

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from recordings.recordings import without_checksums
 
 from automax_ros.cli.output.figure import Layout, figure_of
-from automax_ros.cli.recordings.report_page import page
+from automax_ros.cli.recordings.report import page
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.drive_report.drive_report import drive_report
 from automax_ros.replay.scans.stored_rack import SourceRefused

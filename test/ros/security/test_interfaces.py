@@ -30,7 +30,7 @@ def config_of(path):
 @pytest.mark.parametrize("path", [LINE, OPERATED], ids=lambda path: path.parent.name)
 def test_it_is_what_strangers_see_of_a_rack_that_runs(client, path):
     from automax_ros.ros.rack_nodes import LiveRack
-    from automax_ros.ros.security.interfaces import enclave_of_rack
+    from automax_ros.ros.security.profiles import enclave_of_rack
 
     config = config_of(path)
     live = LiveRack(Rack(config))
@@ -58,8 +58,7 @@ def test_it_is_what_strangers_see_of_a_rack_that_runs(client, path):
 
 def test_a_recorder_needs_no_more_than_its_enclave_allows(client, tmp_path):
     from automax_ros.ros.rack_nodes import LiveRack
-    from automax_ros.ros.security.interfaces import enclave_of_rack
-    from automax_ros.ros.security.profiles import recorder_of
+    from automax_ros.ros.security.profiles import enclave_of_rack, recorder_of
 
     config = config_of(LINE)
     allowed = recorder_of("/line1", [enclave_of_rack(config)])
@@ -82,8 +81,7 @@ def test_a_recorder_needs_no_more_than_its_enclave_allows(client, tmp_path):
 
 
 def test_processes_of_a_distributed_rack_have_enclaves_of_their_own(ros_domain_id):
-    from automax_ros.ros.security.interfaces import enclaves_of_seats
-    from automax_ros.ros.security.profiles import operator_of
+    from automax_ros.ros.security.profiles import enclaves_of_seats, operator_of
 
     config = replace(config_of(LINE), namespace="plant/line1")
     enclaves = {item.path: item for item in enclaves_of_seats(config, processes_of(config))}
@@ -104,7 +102,7 @@ def test_a_rack_with_an_error_has_no_policy(tmp_path):
 
     (tmp_path / "T.BLK").write_text("10 CALL NOTHING(A=1)\n20 END\n")
     (tmp_path / "rack.yaml").write_text("rack: A\nslots:\n  0: {module: 57C435, tasks: {T: {priority: 5}}}\n")
-    from automax_ros.ros.security.interfaces import enclave_of_rack
+    from automax_ros.ros.security.profiles import enclave_of_rack
 
     with pytest.raises(RackError):
         enclave_of_rack(config_of(tmp_path / "rack.yaml"))

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from automax_ros.compile.base import build
+from automax_ros.compile.base.emitter import variable_name
 from automax_ros.compile.base.native_source import NotNative
-from automax_ros.compile.base.pynames import variable_name
 from automax_ros.compile.native.translate.environment import Environment
 from automax_ros.compile.native.translate.frame import Frame
 from automax_ros.compile.native.translate.ranges import ANY_BOOL, Kind, Range

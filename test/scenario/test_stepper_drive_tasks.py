@@ -17,7 +17,7 @@ from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.loader import load
 from automax_ros.runtime.memory.views import MemoryValueError
 from automax_ros.runtime.scan.scan_record import Status
-from automax_ros.scenario.stepping.stepper import Stepper, Why
+from automax_ros.scenario.stepper import Stepper, Why
 
 MS = 1_000_000
 MODELED = "execution: modeled\n"

@@ -7,8 +7,7 @@ from automax_ros.core.user_error import UserError
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status
-from automax_ros.scenario.stepping.stepper import Stepper, Why
-from automax_ros.scenario.stepping.variables import Change
+from automax_ros.scenario.stepper import Change, Stepper, Why
 
 MS = 1_000_000
 RACK = """\

@@ -11,19 +11,175 @@ stepper.line()                   # one line further
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
+from automax_ros.compile.base.scan_io import LineValues
+from automax_ros.compile.compiler import ScanSteps
 from automax_ros.core.text import quoted
-from automax_ros.core.types import Value
+from automax_ros.core.types import DataType, Value
 from automax_ros.core.user_error import UserError
+from automax_ros.language.tree.tree import Scope
+from automax_ros.rack.base.local_names import local_named
 from automax_ros.rack.base.stop_cause import StopCause
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.config import RackConfig, Timing
-from automax_ros.runtime.tasks.task import Status
-from automax_ros.scenario.stepping.held_scans import ByLines
-from automax_ros.scenario.stepping.variables import Change, Variable, Variables
+from automax_ros.rackfile.model.value_names import common_named
+from automax_ros.runtime.scan.execution import IDEAL, Job, Place, Steps
+from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
+
+
+class HeldScan:
+    """A scan that has started and is held before a line. ``line`` is that line, 0 before ``advance`` was called."""
+
+    def __init__(self, item: ScheduledTask, now_ns: int, skipped: int) -> None:
+        """Create the scan without executing it: ``advance`` goes to the first line."""
+        task = item.task
+        self.item = item
+        self.line = 0
+        self.values: Mapping[str, Value | list[Value]] = {}
+        form = cast(ScanSteps, task.compiled.scan_lines.scan)
+        self._names = [*(field.name for field in task.compiled.layout.fields), *task.compiled.latched]
+        self._skipped = skipped
+        self._record: ScanRecord | None = None
+        self._steps = cast(
+            Generator[LineValues, None, ScanRecord | None], task.scan_modeled(now_ns, skipped, form=form)
+        )
+
+    def advance(self) -> bool:
+        """Go to the next line; return FALSE if the scan has ended, which ``finish`` reports.
+
+        ``values`` are then the scan's values by names of its layout: locals, block states, and its latched commons.
+        """
+        try:
+            self.line, values = next(self._steps)
+        except StopIteration as end:
+            self._record = end.value
+            return False
+        self.values = dict(zip(self._names, values, strict=True))
+        return True
+
+    def finish(self) -> None:
+        """Report the ended scan, which may start other scans."""
+        self.item.statistics.skipped += self._skipped
+        self.item.done(self._record)
+
+    def close(self) -> None:
+        """Abandon the scan: the task is as before it; its writes to memory stay."""
+        self._steps.close()
+
+
+class ByLines:
+    """An execution that holds the scans of the tasks in ``held_tasks``. ``held`` is the scan that waits."""
+
+    def __init__(self) -> None:
+        """Create an execution that holds no task."""
+        self.held_tasks: dict[str, ScheduledTask] = {}
+        self.held: HeldScan | None = None
+
+    def begin(self, job: Job, now_ns: int, skipped: int) -> None:
+        """Execute a job, or hold it."""
+        item = self.held_tasks.get(job.name)
+        if item is None:
+            job.whole(now_ns, skipped)
+        else:
+            self.held = HeldScan(item, now_ns, skipped)
+
+    def advance(self) -> bool:
+        """Go to the next line of the held scan; return FALSE at its end: then none is held, or one that follows it."""
+        held = self.held
+        assert held is not None
+        if held.advance():
+            return True
+        self.held = None
+        held.finish()
+        return False
+
+    def busy(self, job: Job) -> bool:
+        """Return whether a job's scan is held."""
+        return self.held is not None and self.held.item is job
+
+    def drop(self, job: Job) -> None:
+        """Abandon a held scan."""
+        if self.held is not None and self.held.item is job:
+            self.held.close()
+            self.held = None
+
+    def place(self, job: Job) -> Place | None:
+        """Return None: another rack could not continue a held scan."""
+        return IDEAL.place(job)
+
+    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
+        """Refuse, as ideal execution does.
+
+        Raises:
+            ValueError: always.
+        """
+        IDEAL.resume(job, place, steps)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A simple variable or an array's element. ``task`` is its task, "" for a common."""
+
+    label: str
+    type: DataType
+    length: int
+    task: str
+    read: Callable[[], Value]
+
+
+@dataclass(frozen=True)
+class Change:
+    """Values of a variable before and after a step."""
+
+    label: str
+    before: Value
+    after: Value
+
+
+@dataclass(frozen=True)
+class Variables:
+    """Finds variables of a rack; a task's own have, in a held scan, their values at its line."""
+
+    rack: Rack
+    execution: ByLines
+
+    def find(self, name: str) -> Variable:
+        """Return the variable with a name.
+
+        Raises:
+            NameFault: there is no such variable or element.
+        """
+        return self._of_task(name) if "." in name else self._common(name)
+
+    def of_task(self, name: str) -> Iterator[Variable]:
+        """Yield the simple variables of a task, its commons too, in the order of declaration."""
+        for symbol in self.rack.task(name).compiled.program.symbols.values():
+            if not symbol.dimensions:
+                common = symbol.scope is Scope.COMMON
+                yield self._common(symbol.name) if common else self._of_task(f"{name}.{symbol.name}")
+
+    def _common(self, name: str) -> Variable:
+        meant = common_named(self.rack.config, name)
+        view = self.rack.memory.view(meant.name)
+        read = partial(self.rack.memory.read_now, view, meant.index)
+        return Variable(meant.label, meant.variable.type, meant.variable.length, "", read)
+
+    def _of_task(self, name: str) -> Variable:
+        meant = local_named(self.rack.tasks, name)
+        kind = meant.variable
+        read = partial(self._local, meant.task, kind.name, meant.element.index)
+        return Variable(meant.label, kind.type, kind.length, meant.task.name, read)
+
+    def _local(self, task: Task, name: str, index: int) -> Value:
+        held = self.execution.held
+        value = held.values[name] if held is not None and held.item.task is task and held.line else task.value(name)
+        return value[index] if isinstance(value, list) else value
+
 
 LONGEST_WAIT_NS = 60_000_000_000
 """Longest step to a task's next scan: the task may wait for an event (decision)."""

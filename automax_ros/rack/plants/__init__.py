@@ -1,1 +1,0 @@
-"""The plants of a running rack: their time, and their signals in commons."""

@@ -1,1 +1,0 @@
-"""Steps a rack by ticks, scans and BASIC lines."""
