@@ -83,7 +83,6 @@ class Suggester:
     """Finds near words until its budget of comparisons is used up."""
 
     def __init__(self) -> None:
-        """Create with the whole budget."""
         self._left = MAX_COMPARISONS
 
     def hint(self, word: str, known: Iterable[str], *, most: int = 1) -> str | None:

@@ -171,7 +171,6 @@ class _Worker:
     """A process that does one piece after the other; ``task`` is its present piece and the number of the try."""
 
     def __init__(self, workers: dict[Connection, _Worker]) -> None:
-        """Start it and add it to the workers."""
         self.end, other = multiprocessing.Pipe()
         self.task: tuple[int, int] | None = None
         with other:

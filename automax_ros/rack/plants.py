@@ -100,7 +100,6 @@ class RackPlants(dict[str, DrivePlant]):
     """The plants with a motor, by name. They continue whether or not the rack has power."""
 
     def __init__(self, configs: Sequence[PlantConfig]) -> None:
-        """Create all plants, at rest, and couple them."""
         super().__init__(build_plants(configs))
         self._parts: dict[str, DrivePlant | CoupledPlants] = {**self, **couple_plants(self, configs)}
 

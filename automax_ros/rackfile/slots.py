@@ -35,7 +35,6 @@ class SlotReader:
     """Reads the ``slots`` section."""
 
     def __init__(self, tasks: TaskReader, findings: ProblemList, executive: int, plants: Plants) -> None:
-        """Create from the reader of tasks, which knows the names of the whole rack, and the Executive's version."""
         self._executive, self._plants, self._tasks, self._findings = executive, plants, tasks, findings
         self._placed: dict[int, PlacedModule] = {}
         self._places: dict[int, Span] = {}

@@ -376,13 +376,11 @@ class RackNodes:
                 time.sleep(LOOK_S)
 
     def __enter__(self) -> RackNodes:
-        """Return itself."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close."""
         self.close()
 
     def _managed(self) -> list[ManagedModuleNode]:

@@ -106,7 +106,6 @@ class OperationLog:
     """
 
     def __init__(self, is_own: Callable[[], bool]) -> None:
-        """Create an empty log."""
         self._is_own = is_own
         self.happened: list[OperationRecord] = []
 

@@ -76,7 +76,6 @@ class ByLines:
     """An execution that holds the scans of the tasks in ``held_tasks``. ``held`` is the scan that waits."""
 
     def __init__(self) -> None:
-        """Create an execution that holds no task."""
         self.held_tasks: dict[str, ScheduledTask] = {}
         self.held: HeldScan | None = None
 

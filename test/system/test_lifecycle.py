@@ -152,4 +152,4 @@ def test_a_file_without_a_name_cannot_wait(ros_domain_id, tmp_path):
     with Automax("run", tmp_path / "rack.yaml", "--no-autostart") as process:
         ended = process.end()
     assert ended.code == 2
-    assert "says no name of a rack" in ended.err
+    assert "has no rack name (`rack:`)" in ended.err

@@ -135,7 +135,7 @@ def namespace_of(path: Path) -> str:
     """
     found = load_rack_file(path, allow_outside=False).namespace
     if found is None:
-        raise UsageError(f"{path} says no name of a rack", "the node `rack` needs one: rack: PM1")
+        raise UsageError(f"{path} has no rack name (`rack:`)", "the node `rack` needs one: rack: PM1")
     return found
 
 

@@ -54,13 +54,11 @@ class CsvTable:
             raise
 
     def __enter__(self: _Table) -> _Table:
-        """Return the table itself."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file."""
         self.close()
 
     def close(self) -> None:

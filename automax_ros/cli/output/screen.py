@@ -157,7 +157,6 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Erase the bar."""
         if self._drawn:
             write_control(sys.stderr, erasing(self._drawn, shutil.get_terminal_size().columns))
             sys.stderr.flush()

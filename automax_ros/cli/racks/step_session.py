@@ -259,9 +259,9 @@ class Session:
             yield from (item for item in self.stepper.variables.of_task(name) if item.task)
 
     def _times(self, words: list[str]) -> int:
-        times = self._whole(words[0], "how often") if words else 1
+        times = self._whole(words[0], "the count") if words else 1
         if not 1 <= times <= MOST_STEPS:
-            raise CommandFault(f"how often is 1 to {MOST_STEPS}, not {times}")
+            raise CommandFault(f"the count must be between 1 and {MOST_STEPS}, not {times}")
         return times
 
     @staticmethod

@@ -234,7 +234,7 @@ def _points(varied: list[Varied], arguments: argparse.Namespace) -> list[Point]:
     points = _read("--sample", lambda: sample(varied, arguments.sample, seed))
     if len(points) < arguments.sample:
         count = count_of(arguments.sample - len(points), "run")
-        print(f"automax sweep: {count} of the sample would be the same as another, and left out", file=sys.stderr)
+        print(f"automax sweep: {count} duplicate points of the sample skipped", file=sys.stderr)
     return points
 
 

@@ -313,7 +313,6 @@ class _Trace:
     def __init__(
         self, lone: StandaloneTask, watched: Sequence[LoneVariable], output: TextIO, errors: TextIO | None
     ) -> None:
-        """Write the headers and put the task into RUN."""
         self._lone = lone
         self._cells: list[tuple[Callable[[], Value], Callable[..., str]]] = [
             (item.read, printable if item.symbol.type is DataType.STRING else value_text) for item in watched

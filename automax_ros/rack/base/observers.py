@@ -53,7 +53,6 @@ class Observers:
     """All observers of one rack; they receive writes in the order in which they happened."""
 
     def __init__(self, memory: CommonMemory) -> None:
-        """Create a list without observers."""
         self._memory = memory
         self._all: list[RackObserver] = []
 

@@ -48,7 +48,6 @@ class Versions:
     """Versions of the values of one image. What was never written has none."""
 
     def __init__(self, registers: RegisterMap) -> None:
-        """Create the versions of an image as installed."""
         self._registers = registers
         self._plain: dict[Key, tuple[Version, Value]] = {}
         self._bits: dict[Key, list[tuple[int, int, Version]]] = {}

@@ -173,7 +173,6 @@ class FrontSwitches:
     """The switches of one module."""
 
     def __init__(self, scheduler: Scheduler, slot: int) -> None:
-        """Create switches at rest."""
         self._scheduler = scheduler
         self._key = EventKey(EventClass.IO, slot, "switch")
         self._test = "centre"

@@ -28,7 +28,6 @@ class OwnRegisters:
     """The registers of a module as it reads and writes them itself; ``view`` is that of its bank."""
 
     def __init__(self, config: ModuleConfig, parts: RackServices) -> None:
-        """Find the registers of a module."""
         bank = parts.backplane.bank(config.slot)
         assert bank is not None
         self.view = bank.view

@@ -62,7 +62,6 @@ class Sender:
     rack: str
 
     def __str__(self) -> str:
-        """Return the name used in messages."""
         return f"rack {self.rack or '?'} slot {self.slot}"
 
 
@@ -112,7 +111,6 @@ class Reception:
     """The drops that a module waits for; ``rivals`` are senders that use another's, with their silence (cycles)."""
 
     def __init__(self, awaited: Iterable[int] = ()) -> None:
-        """Create with drops that are awaited from the start."""
         self._awaited = tuple(awaited)
         self.drops: dict[int, Drop] = {}
         self.rivals: dict[Sender, int] = {}

@@ -53,7 +53,6 @@ class OperationReports:
     """Reports operations to a rack's observers, refused ones too."""
 
     def __init__(self, observers: Observers, scheduler: Scheduler) -> None:
-        """Create for one rack."""
         self._observers, self._scheduler = observers, scheduler
 
     def done(self, what: str, task: str = "", *, reason: str = "", detail: str = "") -> None:
@@ -427,7 +426,7 @@ class Operations:
 
     def _refuse_critical(self, what: str, item: ScheduledTask) -> None:
         if item.name in self._critical and self._runs(item):
-            why = "is critical, it does not stop alone: STOP ALL stops it with all others"
+            why = "is critical: it cannot be stopped on its own; use STOP ALL"
             self.reports.refuse(what, f"task {item.name} {why}", item.name)
 
     def _refuse_faulted(self, what: str, tasks: Sequence[ScheduledTask]) -> None:

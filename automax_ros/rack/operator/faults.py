@@ -101,7 +101,6 @@ class DriveTrips:
     """Observes one rack and records when drive faults come; an earlier fault is listed without its time."""
 
     def __init__(self, rack: Rack) -> None:
-        """Start to observe the rack."""
         self._rack = rack
         self._times: dict[tuple[str, int], int] = {}
         rack.observe(self)

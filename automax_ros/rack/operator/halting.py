@@ -61,7 +61,6 @@ class Halting:
     """
 
     def __init__(self, rack: Rack, pace: object) -> None:
-        """Create from a rack and its pacer."""
         self._rack, self._pace, self._reports = rack, pace, rack.operations.reports
 
     @property

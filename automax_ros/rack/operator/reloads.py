@@ -35,7 +35,6 @@ class Reloads:
     """
 
     def __init__(self, rack: Rack) -> None:
-        """Create for a rack."""
         self._rack, self._reports = rack, rack.operations.reports
 
     def admit(self, task: str, source: str) -> tuple[str, SourceText]:

@@ -50,7 +50,6 @@ class OperatorRequests:
     """
 
     def __init__(self, rack: Rack, pace: object = None) -> None:
-        """Create for a rack and its pacer, if it has one."""
         self._rack, self._reports = rack, rack.operations.reports
         self._readings, self._halting, self.reloads = Readings(rack), Halting(rack, pace), Reloads(rack)
         self._trips = DriveTrips(rack)

@@ -25,7 +25,6 @@ class RackError(Exception):
     """A rack or a task cannot be built; ``findings`` are the diagnostics with the texts they refer to."""
 
     def __init__(self, message: str, findings: Sequence[Finding] = ()) -> None:
-        """Create from a message and the diagnostics of texts."""
         super().__init__(message)
         self.findings = list(findings)
 

@@ -18,7 +18,6 @@ class FileFault(OSError):
     """A file cannot be used; ``too_large`` marks the one reason that has its own problem code."""
 
     def __init__(self, message: str, *, too_large: bool = False) -> None:
-        """Create from the reason."""
         super().__init__(message)
         self.too_large = too_large
 

@@ -34,7 +34,6 @@ class ProblemList:
     """The diagnostics of one file so far."""
 
     def __init__(self) -> None:
-        """Create without diagnostics."""
         self._items: dict[Severity, list[Diagnostic]] = {Severity.ERROR: [], Severity.WARNING: []}
         self._refused: set[Span] = set()
         self._lower_case = False

@@ -24,7 +24,6 @@ class ChunkThread:
     """Carries out jobs one after the other. The thread starts with the first job and ends with this object."""
 
     def __init__(self) -> None:
-        """Create the object without a thread."""
         self._worker: threading.Thread | None = None
         self._calls: SimpleQueue[bool] = SimpleQueue()
         self._jobs: deque[_Job] = deque()
@@ -34,7 +33,6 @@ class ChunkThread:
         self._failed: list[Exception] = []
 
     def __del__(self) -> None:
-        """End the thread."""
         self._calls.put(False)
 
     def hand(self, job: _Job) -> None:

@@ -79,7 +79,6 @@ class DriveRun:
     _base_rpm: float | None = field(init=False)
 
     def __post_init__(self) -> None:
-        """Create the totals."""
         parameters = self.drive.parameters
         self.counts = CountTotals(parameters)
         self._base_rpm = rpm_of(parameters.values["base_speed_rad_s"].value) if parameters is not None else None

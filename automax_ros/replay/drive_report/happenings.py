@@ -48,7 +48,6 @@ class ValuesSet:
     """The values that operators, stimuli and ROS have written; values that follow each other closely are one course."""
 
     def __init__(self) -> None:
-        """Create the collection, without values."""
         self._open: dict[str, _Written] = {}
         self._told: list[tuple[int, str]] = []
         self._values: dict[str, Cell] = {}

@@ -132,7 +132,7 @@ def _keep_time(follows: bool, parameters: list[Parameter[Any]]) -> SetParameters
     """Refuse to change ``use_sim_time`` after the start: messages are stamped with the rack's time."""
     if all(parameter.name != SIM_TIME or parameter.value is follows for parameter in parameters):
         return SetParametersResult(successful=True)
-    own = "the rack follows /clock" if follows else "the rack keeps its own time"
+    own = "the rack follows /clock" if follows else "the rack does not follow /clock"
     cure = f"start it with --ros-args -p use_sim_time:={'false' if follows else 'true'}"
     reason = f"{own}; use_sim_time cannot be set on its nodes: {cure}"
     return SetParametersResult(successful=False, reason=reason)

@@ -91,7 +91,7 @@ class WriteTopic:
             if missing is None:
                 return
             if missing:
-                text = f"{self._topic}: messages come faster than they can be taken; the oldest were dropped"
+                text = f"{self._topic}: messages arrive faster than they can be processed; the oldest were discarded"
                 self._report(DROPPED, self._topic, text, missing)
         else:
             self._is_best_effort |= not reliable

@@ -47,7 +47,6 @@ class RackClient:
     def __init__(
         self, space: str, arguments: RosArguments = NO_ARGUMENTS, should_stop: Callable[[], bool] = lambda: False
     ) -> None:
-        """Join the graph."""
         self._space, self._should_stop = space, should_stop
         self._context = joined_context(arguments)
         quiet = [Parameter("start_type_description_service", value=False)]
@@ -63,11 +62,9 @@ class RackClient:
         self._clients: dict[str, Any] = {}
 
     def __enter__(self) -> RackClient:
-        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave the graph."""
         self._executor.shutdown()
         self._node.destroy_node()
         self._context.try_shutdown()
@@ -153,7 +150,7 @@ class RackClient:
     def _spin(self, deadline: int, name: str) -> None:
         self._go_on()
         if time.monotonic_ns() > deadline:
-            hint = "it may be busy or gone; --timeout waits longer. What was asked may still happen"
+            hint = "it may be busy or gone; --timeout waits longer. The request may still be executed"
             raise NotOperable(f"rack {self._space} does not answer on {name}", hint)
         try:
             self._executor.spin_once(timeout_sec=_LOOK_S)

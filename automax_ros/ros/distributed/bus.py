@@ -315,7 +315,7 @@ class DistributedMemory:
         self._watch.forget(peer.process)
         self._participants.pop(peer.process, None)
         name = part_name(self._rack.config, peer.presence.slots)
-        text = f"{name} is lost: its process has ended, or gives no sign of life"
+        text = f"{name} is lost: its process ended or no longer responds"
         self._site.health.note("lost process", (name, peer.process), lambda: text)
         self._node.get_logger().error(text)
         if self._begun:

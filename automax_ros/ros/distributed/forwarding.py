@@ -29,7 +29,7 @@ RELOAD_ANSWER_S = 60.0
 """Seconds to wait for another process that has to compile."""
 THIS_PROCESS = -1
 """This process, among those that a request concerns."""
-NOT_TOGETHER = "a rack of several processes keeps the wall clock: it cannot be halted or stepped"
+NOT_TOGETHER = "a distributed rack runs on the wall clock and cannot be halted or stepped"
 """Why requests to halt or step a distributed rack are refused (decision)."""
 Local = Callable[[Any, Any], Any]
 """Executes a request in this process and returns the response."""

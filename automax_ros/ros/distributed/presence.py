@@ -48,7 +48,7 @@ class PresencePublisher:
     def _receive(self, presence: Presence, _: bytes) -> None:
         if presence.process != self._process:
             name = self._site.rack.config.name
-            text = f"another rack is called {name}: what the two send cannot be told apart"
+            text = f"another rack is named {name}: their messages cannot be distinguished"
             self._site.health.note("other rack", presence.run_id, lambda: text, most=FROM_STRANGERS)
 
     def _refuse(self, topic: str, what: str) -> None:

@@ -188,7 +188,6 @@ class OperatorNode(ModuleNode):
     """Serves the operator of one rack."""
 
     def __init__(self, site: RackContext) -> None:
-        """Create the services."""
         super().__init__(site, "operator")
         self.operator_services = OperatorServices(self)
 

@@ -73,7 +73,7 @@ class RackLifecycle:
         if not self._held.rack.config.operator:
             return NOT_OPERATED
         if transition not in (ACTIVATE, DEACTIVATE) or not self._held.has_begun:
-            return "the program that holds this rack starts and closes it"
+            return "this rack is started and closed by the program that embeds it"
         return None
 
     def activate(self) -> Pending | None:

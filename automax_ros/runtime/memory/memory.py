@@ -25,7 +25,6 @@ class CommonMemory(Image):
     """The common variables and module registers of one rack; ``now_ns`` is the time of entries in the write log."""
 
     def __init__(self, views: Sequence[ViewSpec]) -> None:
-        """Create the memory as at installation: everything 0, nothing forced."""
         super().__init__(views)
         self._sequence = 0
         self._forced: set[tuple[int, int]] = set()

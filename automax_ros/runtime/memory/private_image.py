@@ -19,7 +19,6 @@ class PrivateImage(Image):
     """A rack's views as one module's tasks see them. Nothing is logged: only views copied out change common memory."""
 
     def __init__(self, views: Sequence[ViewSpec], common: CommonMemory) -> None:
-        """Create the image as at installation, for the memory that it copies from and to."""
         super().__init__(views)
         self._common = common
 
@@ -74,7 +73,6 @@ class LocalMemory:
     """The memory of a module's tasks: ``image`` for the views in ``local``, common memory for the others."""
 
     def __init__(self, common: CommonMemory, local: Collection[int]) -> None:
-        """Create the local memory as at installation."""
         self.image = PrivateImage(common.specs, common)
         self._common, self._local = common, frozenset(local)
         self.view, self.is_forced, self.under_force = common.view, common.is_forced, common.under_force

@@ -173,7 +173,6 @@ class Backplane:
     """Finds the element of common memory that is a register of a slot."""
 
     def __init__(self, banks: Iterable[Bank] = ()) -> None:
-        """Store the banks of all modules that have registers."""
         self._banks = {bank.slot: bank for bank in banks}
 
     def bank(self, slot: int) -> Bank | None:

@@ -83,7 +83,6 @@ class WriteGroup:
         return self.time_ns, self.writer, self.kind
 
     def __repr__(self) -> str:
-        """Return the entries as text."""
         return f"WriteGroup({', '.join(map(repr, self.entries()))})"
 
     def entries(self) -> Iterator[Write]:

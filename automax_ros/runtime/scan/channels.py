@@ -58,7 +58,6 @@ class Channels:
     """The channels of a rack, and the tasks that wait for them."""
 
     def __init__(self) -> None:
-        """Create it without channels."""
         self._all: dict[int, Channel] = {}
         self._waiting: list[tuple[Suspension, int, Wake]] = []
 

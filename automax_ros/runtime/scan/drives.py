@@ -64,7 +64,6 @@ class Drives:
     """The 57C406 modules of a rack by slot, and the 57C405 modules that are wired to their armatures."""
 
     def __init__(self) -> None:
-        """Create it without modules."""
         self._ports: dict[int, DrivePort] = {}
         self._voltages: dict[int, VoltageFeedback] = {}
 

@@ -51,7 +51,6 @@ class Events:
     """The events of a rack by name; a name that two tasks declare is one event (decision: across all Processors)."""
 
     def __init__(self) -> None:
-        """Create it without events."""
         self._all: dict[str, Event] = {}
 
     def event(self, name: str) -> Event:

@@ -31,7 +31,6 @@ class ReplayableReads:
     """
 
     def __init__(self, memory: ScanMemory) -> None:
-        """Store the memory that the task works on."""
         self._memory = memory
         self._accesses: Mapping[int, Call] = memory.accesses if isinstance(memory, CommonMemory) else {}
         self.latched: Sequence[int] = ()

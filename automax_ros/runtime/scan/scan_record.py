@@ -92,7 +92,6 @@ class ScanRecord:  # noqa: PLW1641  # no hash: it changes during the scan
         return bool(self._reads) or bool(self._writes)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether another record has the same content."""
         if not isinstance(other, ScanRecord):
             return NotImplemented
         return all(getattr(self, name) == getattr(other, name) for name in _FIELDS)
@@ -102,7 +101,6 @@ class ScanRecord:  # noqa: PLW1641  # no hash: it changes during the scan
         return _with_fields, tuple(getattr(self, name) for name in _FIELDS)
 
     def __repr__(self) -> str:
-        """Return the record as text."""
         return f"ScanRecord({', '.join(f'{name}={getattr(self, name)!r}' for name in _FIELDS)})"
 
 

@@ -112,7 +112,6 @@ class TaskIo:
     """Access of a compiled scan to memory, error log and printed lines; members are bound once, so that it is fast."""
 
     def __init__(self, task: Host, memory: ScanMemory, outcome_of: OutcomeOf = at_once) -> None:
-        """Bind a task and the memory that its scans work on."""
         self.latch: Callable[[], Latched] = (
             memory.latching(task.plan) if isinstance(memory, Image) else partial(memory.latch, task.plan)
         )
@@ -175,7 +174,6 @@ class RecordingIo(TaskIo):
     """The same, with everything noted in ``record``."""
 
     def __init__(self, task: Host, memory: ScanMemory, outcome_of: OutcomeOf = at_once) -> None:
-        """Bind a task and its memory, with an empty record."""
         super().__init__(task, memory, outcome_of)
         self.record = ScanRecord(0, 0)
         self.latch = self._latch

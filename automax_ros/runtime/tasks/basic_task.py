@@ -29,7 +29,6 @@ class BasicIo(TaskIo):
     """Access of a burst to memory and channels."""
 
     def __init__(self, task: BasicTask, memory: ScanMemory, outcome_of: OutcomeOf = at_once) -> None:
-        """Bind a task, the memory that its bursts work on, and channels."""
         super().__init__(task, memory, outcome_of)
         self._basic = task
         self._channels = task.channels

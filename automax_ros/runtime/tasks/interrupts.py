@@ -18,7 +18,6 @@ class Interrupts:
     """The interrupts of one rack; an ISCR is the view of a module's bank with a register."""
 
     def __init__(self, memory: CommonMemory, events: Events) -> None:
-        """Create it without hardware events."""
         self._memory, self._events = memory, events
         self._bound: dict[tuple[int, int], dict[tuple[int, str, str], tuple[Task, Event]]] = {}
         self._watchers: list[Callable[[], None]] = []

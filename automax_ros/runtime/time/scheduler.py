@@ -72,7 +72,6 @@ class Scheduler:
     """
 
     def __init__(self, start_ns: int = 0) -> None:
-        """Create it at an instant, with an empty queue."""
         self.now_ns = start_ns
         self._queue: list[_Queued] = []
         self._serial = 0

@@ -65,7 +65,7 @@ def _read(path: Path, verbs: Mapping[str, Verb], elsewhere: tuple[str, ...]) -> 
         root = read_yaml(source.text, findings.yaml_flaw, "a stimuli file", nodes=_MOST_NODES)
     stimuli = _Reader(verbs, elsewhere, findings).read(root) if root is not None else ()
     if not stimuli and not findings.errors:
-        findings.add("AMX6744", "the stimuli file holds no entries: it lets nothing happen", _START)
+        findings.add("AMX6744", "the stimuli file has no entries and would have no effect", _START)
     return StimuliFile(None if findings.errors else tuple(stimuli), findings.in_order(), source)
 
 

@@ -50,7 +50,6 @@ class WavePlayer:
     """
 
     def __init__(self, scheduler: Scheduler) -> None:
-        """Create a player on a scheduler's time."""
         self.scheduler = scheduler
         self.is_sampling = False
         self._driven: dict[str, list[ScheduledEvent]] = {}

@@ -67,7 +67,7 @@ def test_simulated_time_is_refused(live, client):
     for node in ("common_memory", "processor_1", "processor_2"):
         found = answer(live, client, SetParameters, f"/types/{node}/set_parameters", request)
         assert not found.results[0].successful
-        assert "the rack keeps its own time" in found.results[0].reason
+        assert "the rack does not follow /clock" in found.results[0].reason
     arrays.clear()
     until(live, client, lambda: arrays)
     assert arrays[0].header.stamp.sec > 1_600_000_000
