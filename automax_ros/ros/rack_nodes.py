@@ -123,7 +123,7 @@ class RackNodes:
         context: Context | None = None,
         arguments: RosArguments | None = None,
         manager: RackNode | None = None,
-        seating: ProcessLayout | None = None,
+        process_layout: ProcessLayout | None = None,
         simulated: SimulatedTime | None = None,
     ) -> None:
         """Create the nodes; nothing runs yet.
@@ -134,7 +134,7 @@ class RackNodes:
             arguments: the ROS arguments of the nodes; those of this process if None, as in rclpy. Their namespace is
                 for a rack that is given by its file; a ``Rack`` has its own.
             manager: the node ``rack`` if the caller has one and manages its state; else one is created here.
-            seating: the processes of a distributed rack; ``rack`` is the part of this one.
+            process_layout: the processes of a distributed rack; ``rack`` is the part of this one.
             simulated: simulated time instead of the wall clock, which is then published on ``/clock``.
 
         Raises:
@@ -154,7 +154,7 @@ class RackNodes:
         self._context = get_default_context() if context is None else context
         turns = RackLock()
         follows = follows_clock(arguments, self.rack.config.namespace)
-        if follows and seating is not None:
+        if follows and process_layout is not None:
             raise RosArgumentsError(_TOGETHER, "leave out use_sim_time, or run the rack in one process")
         self._clock = RackClock(self.rack.scheduler, turns, follows=follows, simulated=simulated)
         self._pacer = self._clock.pace
@@ -168,7 +168,7 @@ class RackNodes:
             self._intake,
             arguments,
             lock=turns,
-            is_recorded=seating is not None and seating.awaits_recorder,
+            is_recorded=process_layout is not None and process_layout.awaits_recorder,
         )
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
@@ -186,8 +186,8 @@ class RackNodes:
         self._to_begin: _Beginning | None = None
         if manager is not None:
             self.rack.observers.add(Follower(manager))
-        self.bus = None if seating is None else DistributedMemory(self._site, self.nodes, seating)
-        if seating is None:
+        self.bus = None if process_layout is None else DistributedMemory(self._site, self.nodes, process_layout)
+        if process_layout is None:
             PresencePublisher(self._site, self.nodes[0])
         self._desk = None if self.bus is None else forward_operator(self.nodes, self.bus)
         self.notes = self._begin_with(arguments)
@@ -426,7 +426,7 @@ class LiveRack:
         self,
         rack: Rack,
         arguments: RosArguments = NO_ARGUMENTS,
-        seating: ProcessLayout | None = None,
+        process_layout: ProcessLayout | None = None,
         *,
         process: RosProcess | None = None,
         manager: RackNode | None = None,
@@ -437,7 +437,7 @@ class LiveRack:
         Args:
             rack: a rack that was not started.
             arguments: the ROS arguments of the nodes.
-            seating: the processes of a distributed rack, as for ``RackNodes``.
+            process_layout: the processes of a distributed rack, as for ``RackNodes``.
             process: the caller's context and executor, which the caller closes; the rack's own if None.
             manager: the caller's node ``rack``, as for ``RackNodes``.
             simulated: simulated time, as for ``RackNodes``.
@@ -453,7 +453,12 @@ class LiveRack:
         try:
             with self._process.resting():
                 self.nodes = RackNodes(
-                    rack, context=context, arguments=arguments, manager=manager, seating=seating, simulated=simulated
+                    rack,
+                    context=context,
+                    arguments=arguments,
+                    manager=manager,
+                    process_layout=process_layout,
+                    simulated=simulated,
                 )
                 self.nodes.add_to(self._executor)
         except RCLError as error:

@@ -1,12 +1,12 @@
 """The tables of a live rack on topics: ``tasks`` and ``forces`` (latched, on change), ``statistics`` (each second).
 
-The home, the process with common memory, publishes forces and the tasks of the whole rack; each process publishes the
+The process with common memory publishes forces and the tasks of the whole rack; each process publishes the
 statistics of its own modules. A table is checked once per second of rack time, and soon after each operation, ten
 times per second at most (decision).
 
-Each other process publishes the tasks of its own modules on ``tasks/parts``, each second and when they change; the home
-joins them by module (``JoinedTasks``). A module without a part for ``SILENT_NS`` is not in the table (decision): the
-state of its tasks is unknown.
+Each other process publishes the tasks of its own modules on ``tasks/parts``, each second and when they change; common
+memory's process joins them by module (``JoinedTasks``). A module without a part for ``SILENT_NS`` is not in the table
+(decision): the state of its tasks is unknown.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey
 PARTS = "tasks/parts"
 """The topic of the parts, in the rack's namespace."""
 PART = QosProfile("reliable", "transient_local", "keep_last", 32)
-"""Latched, so that the home receives the last parts of all processes."""
+"""Latched, so that the process with common memory receives the last parts of all processes."""
 SILENT_NS = 3 * NS_PER_S
 MOST_BYTES = 1 << 20
 """Longest part that is read."""
@@ -159,7 +159,7 @@ class StatusTables:
 
     def _report(self, now_ns: int) -> None:
         if not self._rack.part.holds_common_memory:
-            self._sent.clear()  # publish each second, so that the home knows that this process lives
+            self._sent.clear()  # publish each second, so that common memory's process knows that this process lives
         self.look(now_ns)
         passed_ns, self._reported_ns = now_ns - self._reported_ns, now_ns
         tasks = [statistics_of(module, item, passed_ns) for module in self._rack.task_modules for item in module.tasks]
