@@ -74,7 +74,7 @@ def forward_operator(nodes: Sequence[ModuleNode], bus: DistributedMemory) -> Ope
 
     Returns the services created here, to be closed; None if the rack has no operator, or its node closes them.
     """
-    rack = nodes[0].site.rack
+    rack = nodes[0].rack_context.rack
     memory = next((node for node in nodes if isinstance(node, CommonMemoryNode)), None)
     for node in nodes:
         if isinstance(node, OperatorNode) and memory is not None:
@@ -159,7 +159,7 @@ class RackNodes:
         self._clock = RackClock(self.rack.scheduler, turns, follows=follows, simulated=simulated)
         self._pacer = self._clock.pace
         self._intake = MessageIntake(self._report)
-        self._site = RackContext(
+        self._rack_context = RackContext(
             self.rack,
             self.stream,
             self._pacer,
@@ -172,7 +172,7 @@ class RackNodes:
         )
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
-        self.nodes = nodes_of(self._site)
+        self.nodes = nodes_of(self._rack_context)
         self._own: tuple[RackNode, ...] = ()
         if manager is None and self.rack.part.holds_common_memory:
             manager = RackNode(
@@ -182,13 +182,13 @@ class RackNodes:
             manager.follow(INACTIVE)
             self._own = (manager,)
         self.manager = manager
-        self._clock.join(self._site, self.nodes[0])
+        self._clock.join(self._rack_context, self.nodes[0])
         self._to_begin: _Beginning | None = None
         if manager is not None:
             self.rack.observers.add(Follower(manager))
-        self.bus = None if process_layout is None else DistributedMemory(self._site, self.nodes, process_layout)
+        self.bus = None if process_layout is None else DistributedMemory(self._rack_context, self.nodes, process_layout)
         if process_layout is None:
-            PresencePublisher(self._site, self.nodes[0])
+            PresencePublisher(self._rack_context, self.nodes[0])
         self._desk = None if self.bus is None else forward_operator(self.nodes, self.bus)
         self.notes = self._begin_with(arguments)
 
@@ -210,7 +210,7 @@ class RackNodes:
     @property
     def lock(self) -> AbstractContextManager[None]:
         """A context that holds off scans and messages: ``with nodes.lock``. Rack time is the present in it."""
-        return self._site.between_scans()
+        return self._rack_context.between_scans()
 
     def add_to(self, executor: Any) -> None:
         """Add the nodes to an rclpy executor of any kind, alone or with nodes of your own."""
@@ -247,7 +247,7 @@ class RackNodes:
         beginning, self._to_begin = self._to_begin, None
         if beginning is None:
             return
-        with self._site.lock:
+        with self._rack_context.lock:
             if self.bus is None:
                 self.stream.begin(self._pacer.begin(START_LEAD_NS))
                 self._begun = True
@@ -276,7 +276,7 @@ class RackNodes:
             return Pending(
                 lambda done: services.run_everywhere(lambda why: done(TransitionRefused(why) if why else None))
             )
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             self.rack.operations.run_all()
         return None
 
@@ -286,7 +286,7 @@ class RackNodes:
         Raises:
             OperationRefused: the power is off.
         """
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             self.rack.operations.stop_all(DEACTIVATED)
 
     def await_others(self, should_stop: Callable[[], bool]) -> bool:
@@ -341,7 +341,7 @@ class RackNodes:
         if self._thread is not None:
             self._thread.join()
         self._intake.stop()
-        with self._site.lock:
+        with self._rack_context.lock:
             if self.bus is not None:
                 self.bus.leave()
             self.rack.operations.stop_tasks()
@@ -367,7 +367,7 @@ class RackNodes:
 
     def _deliver(self) -> None:
         """Wait until subscribers have received all: a writer that is destroyed sends nothing again."""
-        deadline_ns = time.monotonic_ns() + (DELIVERY_TO_RECORDER_NS if self._site.is_recorded else DELIVERY_NS)
+        deadline_ns = time.monotonic_ns() + (DELIVERY_TO_RECORDER_NS if self._rack_context.is_recorded else DELIVERY_NS)
         waiting = [publisher for node in self.nodes for publisher in node.publishers]
         # Without a time to wait: rclpy would keep all other threads of Python, and its signals, from running meanwhile.
         while waiting and self._context.ok() and time.monotonic_ns() < deadline_ns:
@@ -389,7 +389,7 @@ class RackNodes:
         return [node for node in self.nodes if isinstance(node, ManagedModuleNode)]
 
     def _enter(self, action: Callable[[], None]) -> None:
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             action()
 
     def _keep_pace(self) -> None:
@@ -397,7 +397,7 @@ class RackNodes:
             self._clock.wait(lambda: self._closed)
             self._begin()
             while not self._closed:
-                with self._site.lock.for_scan:
+                with self._rack_context.lock.for_scan:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:

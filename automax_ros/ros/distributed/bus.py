@@ -146,18 +146,18 @@ class DistributedMemory:
     ``process_slots`` are the slots of each process by the slot that names it, ``plants`` those of the plants' drives.
     """
 
-    def __init__(self, site: RackContext, nodes: Sequence[ModuleNode], process_layout: ProcessLayout) -> None:
+    def __init__(self, rack_context: RackContext, nodes: Sequence[ModuleNode], process_layout: ProcessLayout) -> None:
         """Join the bus by the first of the process's nodes.
 
         Raises:
             ValueError: the rack's part is not one of the processes.
         """
-        rack, processes = site.rack, process_layout.processes
+        rack, processes = rack_context.rack, process_layout.processes
         own = next((slots for slots in processes if set(slots) == rack.part.slots), None)
         if own is None:
             raise ValueError(f"slots {sorted(rack.part.slots)} are not a process of rack {rack.config.name}")
         node = nodes[0]
-        self._site, self._rack, self._node = site, rack, node
+        self._rack_context, self._rack, self._node = rack_context, rack, node
         self.process_slots = {min(slots): tuple(slots) for slots in processes}
         self._limits = BusLimits(self.process_slots)
         self.plants = {item.name: item.slot for item in driven_plants(rack.config)}
@@ -165,7 +165,7 @@ class DistributedMemory:
         self._watch, self._lead_ns = ProcessWatch(), process_layout.start_delay_ns
         self.peers = Peers(process, min(own), own, rack.installed, process_layout.run_id, lives=self._watch.lives)
         self.link = ImageSync(rack, min(own), self._send, process_layout.is_common, self._guarded)
-        self._recorder = RecorderWait(site, nodes, PRESENCE) if process_layout.awaits_recorder else None
+        self._recorder = RecorderWait(rack_context, nodes, PRESENCE) if process_layout.awaits_recorder else None
         self.stage, self.joining = Stage.JOINING, False
         self.fault: ProcessAlreadyRuns | None = None
         self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
@@ -319,7 +319,7 @@ class DistributedMemory:
         self._participants.pop(peer.process, None)
         name = part_name(self._rack.config, peer.presence.slots)
         text = f"{name} is lost: its process has ended, or gives no sign of life"
-        self._site.health.note("lost process", (name, peer.process), lambda: text)
+        self._rack_context.health.note("lost process", (name, peer.process), lambda: text)
         self._node.get_logger().error(text)
         if self._begun:
             self._publish_image(self.link.last_of(peer.presence.seat), FOR_ALL)
@@ -342,7 +342,7 @@ class DistributedMemory:
             self._node.guard.report("the bus", error)
 
     def _refuse(self, topic: str, what: str) -> None:
-        self._site.health.note(
+        self._rack_context.health.note(
             "refused bus message", (topic, what[:40]), lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS
         )
 
@@ -413,10 +413,10 @@ class DistributedMemory:
 
         On a busy host they only wait here, and requesting an image each time would make it busier.
         """
-        with self._site.lock:
+        with self._rack_context.lock:
             is_short = self.peers.is_short(presence)
         if is_short and not all(self._write_topic.take() for _ in range(BATCHES_FIRST)):
-            with self._site.lock:
+            with self._rack_context.lock:
                 self.peers.missed(presence, time.monotonic_ns())
 
     def _report_stranger(self, found: PresenceVerdict, presence: Presence) -> None:
@@ -431,7 +431,9 @@ class DistributedMemory:
             PresenceVerdict.OTHER_FILE: f"{name} has another rack file or other sources: it is not of this run",
             PresenceVerdict.SLOT_TAKEN: f"a second process has {name}",
         }
-        self._site.health.note("other rack", (found, presence.process), lambda: texts[found], most=FROM_STRANGERS)
+        self._rack_context.health.note(
+            "other rack", (found, presence.process), lambda: texts[found], most=FROM_STRANGERS
+        )
 
     def _when_begun(self, take: Callable[[], None]) -> None:
         if self._begun:

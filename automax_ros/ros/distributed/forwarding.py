@@ -61,7 +61,7 @@ class RequestForwarder:
     def __init__(self, node: ModuleNode, bus: DistributedMemory, reloaded: Callable[[], None]) -> None:
         """Find the process of each task, slot and plant."""
         self._reloaded = reloaded
-        config = node.site.rack.config
+        config = node.rack_context.rack.config
         self._node, self._bus, self._config = node, bus, config
         own_slot = bus.peers.process_slot
         self._others = [slot for slot in bus.process_slots if slot != own_slot]
@@ -108,7 +108,7 @@ class RequestForwarder:
     def _note_source(self, request: Any) -> None:
         """Store the new source of a task of another process: recorders get the rack's files from this one."""
         name = request.task.strip().upper()
-        sources = self._node.site.rack.operations.installation.sources
+        sources = self._node.rack_context.rack.operations.installation.sources
         sources[name] = SourceText(sources[name].name, request.source)
         self._reloaded()
 
@@ -211,7 +211,7 @@ class _PendingRequest:
                 self._not_called.append((part, client))
 
     def _answered(self, process: int, future: Any) -> None:
-        with self._node.site.between_scans():
+        with self._node.rack_context.between_scans():
             if process in self._open:
                 self._open.discard(process)
                 self._answers[process] = future.result()

@@ -61,8 +61,8 @@ class JoinedTasks:
     """Receives the parts; ``changed`` is called after each. For the process with common memory."""
 
     def __init__(self, node: ModuleNode, changed: Callable[[], None]) -> None:
-        self._site, self._changed = node.site, changed
-        rack = node.site.rack
+        self._rack_context, self._changed = node.rack_context, changed
+        rack = node.rack_context.rack
         self._tasks = {
             (module.name, module.slot): {task.name for task in module.tasks}
             for module in rack.config.modules
@@ -76,7 +76,7 @@ class JoinedTasks:
         return [item for at_ns, items in self._parts.values() if now_ns - at_ns <= SILENT_NS for item in items]
 
     def _take(self, table: RemoteTable, _: bytes) -> None:
-        if table.run_id != self._site.stream.run_id:
+        if table.run_id != self._rack_context.stream.run_id:
             return  # latched by the run before; other racks are reported by the bus
         modules: dict[str, list[RemoteTask]] = {}
         for item in table.tasks:
@@ -84,19 +84,21 @@ class JoinedTasks:
                 self._refuse(PARTS, "a task that is not another process's")
                 return
             modules.setdefault(item.module, []).append(item)
-        now_ns = self._site.rack.now_ns
+        now_ns = self._rack_context.rack.now_ns
         self._parts |= {module: (now_ns, items) for module, items in modules.items()}
         self._changed()
 
     def _refuse(self, topic: str, what: str) -> None:
-        self._site.health.note("refused table", what[:40], lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS)
+        self._rack_context.health.note(
+            "refused table", what[:40], lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS
+        )
 
 
 class StatusTables:
     """Publishes the tables of this process, by the publishers of one node."""
 
     def __init__(self, node: ModuleNode) -> None:
-        self._rack, self._stream, self._pace = node.site.rack, node.site.stream, node.site.pacer
+        self._rack, self._stream, self._pace = node.rack_context.rack, node.rack_context.stream, node.rack_context.pacer
         part = self._rack.part
         self._tasks = node.create_publisher(TaskTable, "tasks" if part.holds_common_memory else PARTS, ros_qos(LATCHED))
         self._joined = JoinedTasks(node, self._check_soon) if part.holds_common_memory and not part.is_whole else None

@@ -94,9 +94,9 @@ def test_processes_that_hear_of_the_start_when_it_is_over_join(tmp_path):
 def test_what_waits_on_the_bus_is_taken_before_it_counts_as_missing(racks):
     """A process whose door was held up hears how much the other has written before it has taken any of it."""
     _, one, two = racks["parts"]
-    two.bus._node.site.intake.stop()
+    two.bus._node.rack_context.intake.stop()
     peer, link = two.bus.peers.by_slot[1], one.bus.link
-    words = next(item for item in two.bus._node.site.intake._entrances if item.name.endswith("bus/presence"))
+    words = next(item for item in two.bus._node.rack_context.intake._entrances if item.name.endswith("bus/presence"))
     before, told = peer.received, link.sequence + 30
     deadline = time.monotonic() + PATIENCE_NS / NS_PER_S
     while peer.presence.sequence < told and time.monotonic() < deadline:
