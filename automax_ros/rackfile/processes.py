@@ -29,7 +29,7 @@ from automax_ros.language.program import Program
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.model.config import RackConfig, driven_plants
 
-HOME = "common_memory"
+MEMORY_PROCESS = "common_memory"
 """Name of the process with common memory, as that of its node, also if a lone Processor holds the commons."""
 _LOOP_SLOTS = {"io_cntl_slot": "fires the gates of", "dig_io_slot": "reads the permissive of"}
 """The inputs of a current minor loop that name modules, with the action of its task there."""
@@ -71,23 +71,23 @@ def processes_of(config: RackConfig, programs: Iterable[Program] | None = None) 
     found = []
     for slots in _groups([module.slot for module in config.modules], [bond.slots for bond in bonds]):
         modules = tuple(module.name for module in config.modules if module.slot in slots)
-        is_home = config.common_memory_slot in slots
+        holds_memory = config.common_memory_slot in slots
         reasons = tuple(bond.reason for bond in bonds if bond.slots[0] in slots and len(set(bond.slots)) > 1)
-        found.append(RackProcess(HOME if is_home else modules[0], slots, is_home, modules, reasons))
+        found.append(RackProcess(MEMORY_PROCESS if holds_memory else modules[0], slots, holds_memory, modules, reasons))
     return tuple(sorted(found, key=lambda process: (not process.holds_common_memory, process.slots)))
 
 
-def process_named(seats: Sequence[RackProcess], text: str) -> RackProcess:
+def process_named(processes: Sequence[RackProcess], text: str) -> RackProcess:
     """Return the process of a module, which is named by its slot or by its name, such as ``3`` or ``processor_3``.
 
     Raises:
         NoSuchProcess: the rack has no such module.
     """
     wanted = text.strip().lower()
-    for seat in seats:
-        if wanted in (seat.name, *seat.modules, *map(str, seat.slots)):
-            return seat
-    known = [name for seat in seats for name in seat.modules]
+    for process in processes:
+        if wanted in (process.name, *process.modules, *map(str, process.slots)):
+            return process
+    known = [name for process in processes for name in process.modules]
     raise NoSuchProcess(f"the rack has no module {quoted(text)}", near_or_listed(wanted, known))
 
 
@@ -98,9 +98,9 @@ class _Bond(NamedTuple):
 
 def _bonds(config: RackConfig, programs: Sequence[Program]) -> Iterator[_Bond]:
     names = {module.slot: module.name for module in config.modules}
-    homes = {task.name: module.slot for module, task in config.placed_tasks}
+    task_slots = {task.name: module.slot for module, task in config.placed_tasks}
     for program in programs:
-        yield from _task_bonds(program, homes[program.name], names, config)
+        yield from _task_bonds(program, task_slots[program.name], names, config)
     for module in config.modules:
         if module.drive is not None and module.drive in names:
             yield _Bond((module.slot, module.drive), f"{module.name} has the armature voltage of {names[module.drive]}")
@@ -110,7 +110,7 @@ def _bonds(config: RackConfig, programs: Sequence[Program]) -> Iterator[_Bond]:
         other = turned.get(couple.to) if couple is not None else None
         if other is not None:
             yield _Bond((driven.slot, other.slot), f"the shafts of {driven.name} and {other.name} are coupled")
-    yield from _exchange_bonds(programs, homes)
+    yield from _exchange_bonds(programs, task_slots)
 
 
 def _task_bonds(program: Program, slot: int, names: dict[int, str], config: RackConfig) -> Iterator[_Bond]:
@@ -127,7 +127,7 @@ def _task_bonds(program: Program, slot: int, names: dict[int, str], config: Rack
             yield _Bond((slot, other), f"task {program.name} waits for the interrupt {event.name} of {names[other]}")
 
 
-def _exchange_bonds(programs: Sequence[Program], homes: dict[str, int]) -> Iterator[_Bond]:
+def _exchange_bonds(programs: Sequence[Program], task_slots: dict[str, int]) -> Iterator[_Bond]:
     shared: dict[str, list[Program]] = {}
     for program in programs:
         events = [f"the event {event.name}" for event in program.events]
@@ -135,7 +135,7 @@ def _exchange_bonds(programs: Sequence[Program], homes: dict[str, int]) -> Itera
         for what in dict.fromkeys((*events, *channels)):
             shared.setdefault(what, []).append(program)
     for what, group in shared.items():
-        slots = tuple(sorted({homes[program.name] for program in group}))
+        slots = tuple(sorted({task_slots[program.name] for program in group}))
         if len(slots) > 1:
             yield _Bond(slots, f"tasks {' and '.join(program.name for program in group)} share {what}")
 

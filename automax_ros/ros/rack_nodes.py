@@ -74,7 +74,7 @@ def forward_operator(nodes: Sequence[ModuleNode], bus: DistributedMemory) -> Ope
 
     Returns the services created here, to be closed; None if the rack has no operator, or its node closes them.
     """
-    rack = nodes[0].site.rack
+    rack = nodes[0].rack_context.rack
     memory = next((node for node in nodes if isinstance(node, CommonMemoryNode)), None)
     for node in nodes:
         if isinstance(node, OperatorNode) and memory is not None:
@@ -123,7 +123,7 @@ class RackNodes:
         context: Context | None = None,
         arguments: RosArguments | None = None,
         manager: RackNode | None = None,
-        seating: ProcessLayout | None = None,
+        process_layout: ProcessLayout | None = None,
         simulated: SimulatedTime | None = None,
     ) -> None:
         """Create the nodes; nothing runs yet.
@@ -134,7 +134,7 @@ class RackNodes:
             arguments: the ROS arguments of the nodes; those of this process if None, as in rclpy. Their namespace is
                 for a rack that is given by its file; a ``Rack`` has its own.
             manager: the node ``rack`` if the caller has one and manages its state; else one is created here.
-            seating: the processes of a distributed rack; ``rack`` is the part of this one.
+            process_layout: the processes of a distributed rack; ``rack`` is the part of this one.
             simulated: simulated time instead of the wall clock, which is then published on ``/clock``.
 
         Raises:
@@ -154,12 +154,12 @@ class RackNodes:
         self._context = get_default_context() if context is None else context
         turns = RackLock()
         follows = follows_clock(arguments, self.rack.config.namespace)
-        if follows and seating is not None:
+        if follows and process_layout is not None:
             raise RosArgumentsError(_TOGETHER, "leave out use_sim_time, or run the rack in one process")
         self._clock = RackClock(self.rack.scheduler, turns, follows=follows, simulated=simulated)
         self._pacer = self._clock.pace
         self._intake = MessageIntake(self._report)
-        self._site = RackContext(
+        self._rack_context = RackContext(
             self.rack,
             self.stream,
             self._pacer,
@@ -168,11 +168,11 @@ class RackNodes:
             self._intake,
             arguments,
             lock=turns,
-            is_recorded=seating is not None and seating.awaits_recorder,
+            is_recorded=process_layout is not None and process_layout.awaits_recorder,
         )
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
-        self.nodes = nodes_of(self._site)
+        self.nodes = nodes_of(self._rack_context)
         self._own: tuple[RackNode, ...] = ()
         if manager is None and self.rack.part.holds_common_memory:
             manager = RackNode(
@@ -182,13 +182,13 @@ class RackNodes:
             manager.follow(INACTIVE)
             self._own = (manager,)
         self.manager = manager
-        self._clock.join(self._site, self.nodes[0])
+        self._clock.join(self._rack_context, self.nodes[0])
         self._to_begin: _Beginning | None = None
         if manager is not None:
             self.rack.observers.add(Follower(manager))
-        self.bus = None if seating is None else DistributedMemory(self._site, self.nodes, seating)
-        if seating is None:
-            PresencePublisher(self._site, self.nodes[0])
+        self.bus = None if process_layout is None else DistributedMemory(self._rack_context, self.nodes, process_layout)
+        if process_layout is None:
+            PresencePublisher(self._rack_context, self.nodes[0])
         self._desk = None if self.bus is None else forward_operator(self.nodes, self.bus)
         self.notes = self._begin_with(arguments)
 
@@ -210,7 +210,7 @@ class RackNodes:
     @property
     def lock(self) -> AbstractContextManager[None]:
         """A context that holds off scans and messages: ``with nodes.lock``. Rack time is the present in it."""
-        return self._site.between_scans()
+        return self._rack_context.between_scans()
 
     def add_to(self, executor: Any) -> None:
         """Add the nodes to an rclpy executor of any kind, alone or with nodes of your own."""
@@ -247,7 +247,7 @@ class RackNodes:
         beginning, self._to_begin = self._to_begin, None
         if beginning is None:
             return
-        with self._site.lock:
+        with self._rack_context.lock:
             if self.bus is None:
                 self.stream.begin(self._pacer.begin(START_LEAD_NS))
                 self._begun = True
@@ -276,7 +276,7 @@ class RackNodes:
             return Pending(
                 lambda done: services.run_everywhere(lambda why: done(TransitionRefused(why) if why else None))
             )
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             self.rack.operations.run_all()
         return None
 
@@ -286,7 +286,7 @@ class RackNodes:
         Raises:
             OperationRefused: the power is off.
         """
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             self.rack.operations.stop_all(DEACTIVATED)
 
     def await_others(self, should_stop: Callable[[], bool]) -> bool:
@@ -341,7 +341,7 @@ class RackNodes:
         if self._thread is not None:
             self._thread.join()
         self._intake.stop()
-        with self._site.lock:
+        with self._rack_context.lock:
             if self.bus is not None:
                 self.bus.leave()
             self.rack.operations.stop_tasks()
@@ -367,7 +367,7 @@ class RackNodes:
 
     def _deliver(self) -> None:
         """Wait until subscribers have received all: a writer that is destroyed sends nothing again."""
-        deadline_ns = time.monotonic_ns() + (DELIVERY_TO_RECORDER_NS if self._site.is_recorded else DELIVERY_NS)
+        deadline_ns = time.monotonic_ns() + (DELIVERY_TO_RECORDER_NS if self._rack_context.is_recorded else DELIVERY_NS)
         waiting = [publisher for node in self.nodes for publisher in node.publishers]
         # Without a time to wait: rclpy would keep all other threads of Python, and its signals, from running meanwhile.
         while waiting and self._context.ok() and time.monotonic_ns() < deadline_ns:
@@ -387,7 +387,7 @@ class RackNodes:
         return [node for node in self.nodes if isinstance(node, ManagedModuleNode)]
 
     def _enter(self, action: Callable[[], None]) -> None:
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             action()
 
     def _keep_pace(self) -> None:
@@ -395,7 +395,7 @@ class RackNodes:
             self._clock.wait(lambda: self._closed)
             self._begin()
             while not self._closed:
-                with self._site.lock.for_scan:
+                with self._rack_context.lock.for_scan:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
@@ -424,7 +424,7 @@ class LiveRack:
         self,
         rack: Rack,
         arguments: RosArguments = NO_ARGUMENTS,
-        seating: ProcessLayout | None = None,
+        process_layout: ProcessLayout | None = None,
         *,
         process: RosProcess | None = None,
         manager: RackNode | None = None,
@@ -435,7 +435,7 @@ class LiveRack:
         Args:
             rack: a rack that was not started.
             arguments: the ROS arguments of the nodes.
-            seating: the processes of a distributed rack, as for ``RackNodes``.
+            process_layout: the processes of a distributed rack, as for ``RackNodes``.
             process: the caller's context and executor, which the caller closes; the rack's own if None.
             manager: the caller's node ``rack``, as for ``RackNodes``.
             simulated: simulated time, as for ``RackNodes``.
@@ -451,7 +451,12 @@ class LiveRack:
         try:
             with self._process.resting():
                 self.nodes = RackNodes(
-                    rack, context=context, arguments=arguments, manager=manager, seating=seating, simulated=simulated
+                    rack,
+                    context=context,
+                    arguments=arguments,
+                    manager=manager,
+                    process_layout=process_layout,
+                    simulated=simulated,
                 )
                 self.nodes.add_to(self._executor)
         except RCLError as error:

@@ -14,7 +14,7 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.processes import HOME, NoSuchProcess, _groups, process_named, processes_of
+from automax_ros.rackfile.processes import MEMORY_PROCESS, NoSuchProcess, _groups, process_named, processes_of
 
 IDLE = "10 CALL SCAN_LOOP(TICKS=2)\n20 END\n"
 SETS = "10 EVENT NAME=GO\n20 SET GO\n30 STOP\n40 END\n"
@@ -37,7 +37,7 @@ def config_of(folder: Path, slots: str, more: str = "", **sources: str) -> RackC
 
 
 def slots_of(config: RackConfig) -> list[tuple[int, ...]]:
-    return [seat.slots for seat in processes_of(config)]
+    return [process.slots for process in processes_of(config)]
 
 
 def processors(**tasks: str) -> str:
@@ -53,18 +53,19 @@ def test_modules_that_meet_at_registers_alone_are_a_process_each(tmp_path):
     slots = processors(ONE="ONE.BLK", TWO="TWO.BLK") + "  5: {module: 57C419}\n  10: {module: 57552}\n"
     common = "common:\n  START@: {slot: 5, register: 0, bit: 0, ros: in}\n  SUM%: {}\n"
     config = config_of(tmp_path, slots, common, ONE="5 COMMON SUM%, START@\n" + IDLE, TWO="5 COMMON SUM%\n" + IDLE)
-    seats = processes_of(config)
-    assert [seat.name for seat in seats] == [HOME, "processor_1", "processor_2", "digital_io_5", "udc_10"]
-    assert [seat.holds_common_memory for seat in seats] == [True, False, False, False, False]
-    assert all(seat.reasons == () and len(seat.slots) == 1 for seat in seats)
+    processes = processes_of(config)
+    names = [MEMORY_PROCESS, "processor_1", "processor_2", "digital_io_5", "udc_10"]
+    assert [process.name for process in processes] == names
+    assert [process.holds_common_memory for process in processes] == [True, False, False, False, False]
+    assert all(process.reasons == () and len(process.slots) == 1 for process in processes)
 
 
-def test_lone_processor_is_the_home(tmp_path):
+def test_lone_processor_holds_common_memory(tmp_path):
     config = load(folder_of(tmp_path)).config
     assert config is not None
-    (home,) = processes_of(config)
-    assert (home.name, home.slots, home.holds_common_memory) == (HOME, (0, 7, 8), True)
-    assert home.modules == ("processor_0", "drive_7", "digital_io_8")
+    (process,) = processes_of(config)
+    assert (process.name, process.slots, process.holds_common_memory) == (MEMORY_PROCESS, (0, 7, 8), True)
+    assert process.modules == ("processor_0", "drive_7", "digital_io_8")
 
 
 def test_a_loop_keeps_its_drive_its_contactor_and_its_voltage(tmp_path):
@@ -78,9 +79,9 @@ def test_a_loop_keeps_its_drive_its_contactor_and_its_voltage(tmp_path):
     )
     config = config_of(tmp_path, slots, more, ONE=IDLE, CML=CML)
     assert slots_of(config) == [(0,), (1,), (2, 7, 8, 9), (11,)]
-    seat = processes_of(config)[2]
-    assert seat.words == "processor_2 (processor_2 drive_7 digital_io_8 drive_analog_9)"
-    assert seat.reasons == (
+    process = processes_of(config)[2]
+    assert process.words == "processor_2 (processor_2 drive_7 digital_io_8 drive_analog_9)"
+    assert process.reasons == (
         "task CML fires the gates of drive_7",
         "task CML reads the permissive of digital_io_8",
         "drive_analog_9 has the armature voltage of drive_7",

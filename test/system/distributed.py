@@ -21,7 +21,7 @@ from automax_ros.ros.clients.recorder import RawSubscription
 from system.support import PATIENCE_S, RACKS, Automax, Client, wait_until
 
 LINE4 = RACKS / "line4"
-SEATS = ("common_memory", "processor_1", "processor_2", "processor_3", "processor_4", "digital_io_5", "udc_10")
+PROCESS_NAMES = ("common_memory", "processor_1", "processor_2", "processor_3", "processor_4", "digital_io_5", "udc_10")
 RINGS = range(1, 5)
 FEED = {ring: (ring + 2) % 4 + 1 for ring in RINGS}
 """Which Processor is before each in the ring."""
@@ -47,7 +47,7 @@ class Distributed(Automax):
         super().__init__("run", rack, "--distributed", *given, *options)
 
     @property
-    def seats(self) -> dict[str, int]:
+    def process_ids(self) -> dict[str, int]:
         """The ids of the rack's processes that live, by name."""
         found = {}
         for path in Path("/proc").glob("[0-9]*/stat"):
@@ -59,15 +59,15 @@ class Distributed(Automax):
                 continue  # it has just ended, or is the recorder
         return found
 
-    def kill(self, seat: str) -> int:
+    def kill(self, name: str) -> int:
         """Kill a process of the rack; return its id."""
-        pid = self.seats[seat]
+        pid = self.process_ids[name]
         os.kill(pid, signal.SIGKILL)
         return pid
 
-    def wait_until_back(self, seat: str, pid: int) -> None:
-        """Wait until another process has a seat."""
-        wait_until(lambda: self.seats.get(seat, pid) != pid)
+    def wait_until_back(self, name: str, pid: int) -> None:
+        """Wait until another process has its place."""
+        wait_until(lambda: self.process_ids.get(name, pid) != pid)
 
     @property
     def report(self) -> dict[str, Any]:
@@ -134,21 +134,22 @@ class Line(Client):
         running = Stage.RUNNING
         self.until(
             lambda: (
-                len(self.processes) == len(SEATS) and all(item.state == running for item in self.processes.values())
+                len(self.processes) == len(PROCESS_NAMES)
+                and all(item.state == running for item in self.processes.values())
             ),
             "all processes run",
         )
         before = dict(self.values)
         self.until(lambda: all(self.values.get(f"N_{n}", 0) > before.get(f"N_{n}", 0) for n in RINGS), "counters move")
 
-    def until_new(self, seat: int, process: int) -> None:
+    def until_new(self, slot: int, process: int) -> None:
         """Wait until another life of a process runs."""
 
         def is_back() -> bool:
-            found = self.processes[seat]
+            found = self.processes[slot]
             return found.process != process and found.state == Stage.RUNNING
 
-        self.until(is_back, f"seat {seat} is back")
+        self.until(is_back, f"the process of slot {slot} is back")
 
     def halt(self) -> None:
         """Let the ring stand still, and wait until each has seen the last of the one before it."""

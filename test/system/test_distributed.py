@@ -19,7 +19,7 @@ from automax_ros.messages.types.messages import NAMES, Scan
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.recordings.read.reader import BagReader
-from system.distributed import RINGS, SEATS, Distributed, Line, copied
+from system.distributed import PROCESS_NAMES, RINGS, Distributed, Line, copied
 from system.support import PATIENCE_S, TYPES, Automax, automax, automax_here, wait_until
 
 TASKS = {"CML", "RING_1", "RING_2", "RING_3", "RING_4", "SPEED", "WIND_A"}
@@ -63,8 +63,8 @@ def test_scans_are_those_of_one_process(ros_domain_id, tmp_path):
     assert ended.code == 0, ended
     report = run.report
     assert set(report["tasks"]) == TASKS
-    assert {name: told["deaths"] for name, told in report["processes"].items()} == dict.fromkeys(SEATS, 0)
-    assert {name: told["differs"] for name, told in report["processes"].items()} == {name: [] for name in SEATS}
+    assert {name: told["deaths"] for name, told in report["processes"].items()} == dict.fromkeys(PROCESS_NAMES, 0)
+    assert {name: told["differs"] for name, told in report["processes"].items()} == {name: [] for name in PROCESS_NAMES}
     due = 3 * NS_PER_S // TICK_NS + 1
     for ring in RINGS:
         task = report["tasks"][f"RING_{ring}"]
@@ -86,13 +86,13 @@ def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_do
     rack = copied(tmp_path)
     with Distributed(rack) as run, Line() as line:
         line.until_it_scans()
-        for pid in run.seats.values():
+        for pid in run.process_ids.values():
             mapped = Path(f"/proc/{pid}/maps").read_text()
             assert "/dev/shm/fastrtps_" not in mapped, "who is killed leaves it in a state that others wait for"
-        for name, seat in (("processor_2", 2), ("common_memory", 0)):
-            before, life = dict(line.values), line.processes[seat].process
+        for name, slot in (("processor_2", 2), ("common_memory", 0)):
+            before, life = dict(line.values), line.processes[slot].process
             run.kill(name)
-            line.until_new(seat, life)
+            line.until_new(slot, life)
             line.until_it_scans()
             assert all(line.values[f"N_{ring}"] > before[f"N_{ring}"] for ring in RINGS), "counters go on"
         line.halt()
@@ -100,7 +100,7 @@ def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_do
     assert (ended.code, ended.err.count("Traceback")) == (0, 0), ended
     report = run.report
     deaths = {name: told["deaths"] for name, told in report["processes"].items()}
-    assert deaths == dict.fromkeys(SEATS, 0) | {"processor_2": 1, "common_memory": 1}
+    assert deaths == dict.fromkeys(PROCESS_NAMES, 0) | {"processor_2": 1, "common_memory": 1}
     for name, told in report["processes"].items():
         assert told["told"]
         assert not RING_COMMONS & set(told["differs"]), name
@@ -118,7 +118,7 @@ def test_stop_all_when_a_process_is_lost(ros_domain_id, tmp_path):
         line.until_it_scans()
         killed_ns = time.time_ns()
         run.kill("processor_3")
-        line.until(lambda: all(item.stopped for seat, item in line.processes.items() if seat != 3), "all stop")
+        line.until(lambda: all(item.stopped for slot, item in line.processes.items() if slot != 3), "all stop")
         ended = run.end(signal.SIGINT)
     report = run.report
     noticed_ns = line.began_ns + round(report["stopped"]["time_s"] * NS_PER_S)
@@ -135,15 +135,15 @@ def test_processes_end_with_whoever_started_them(ros_domain_id, tmp_path):
     rack = shutil.copytree(TYPES.parent, tmp_path / "rack")
     file = rack / "rack.yaml"
     file.write_text(file.read_text().replace("rack: TYPES", "rack: TYPES\non_module_loss: hold"))
-    seats = {"common_memory", "processor_1", "processor_2"}
+    names = {"common_memory", "processor_1", "processor_2"}
     with Distributed(rack) as run:
-        wait_until(lambda: set(run.seats) == seats)
+        wait_until(lambda: set(run.process_ids) == names)
         second = automax_here("run", rack, "--distributed")
         assert (second.code, "runs already" in second.err) == (2, True)
         whole = automax_here("run", rack)
         assert (whole.code, "distributed over several processes" in whole.err) == (2, True)
-        pids = list(run.seats.values())
-        assert len(pids) == len(seats)
+        pids = list(run.process_ids.values())
+        assert len(pids) == len(names)
         run.send(signal.SIGKILL)
         wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids))
 
@@ -167,12 +167,12 @@ def test_seven_processes_scan_for_a_minute(ros_domain_id, tmp_path):
 def test_a_hundred_random_kills(ros_domain_id, tmp_path):
     """Nobody else is disturbed, no value is wrong, nothing hangs; each death is noticed and made good."""
     random = Random(5)
-    places = dict(zip(SEATS, (0, 1, 2, 3, 4, 5, 10), strict=True))
+    places = dict(zip(PROCESS_NAMES, (0, 1, 2, 3, 4, 5, 10), strict=True))
     killed: Counter[str] = Counter()
     with Distributed(copied(tmp_path)) as run, Line() as line:
         line.until_it_scans()
         for _ in range(KILLS):
-            name = random.choice(SEATS)
+            name = random.choice(PROCESS_NAMES)
             before, life = dict(line.values), line.processes[places[name]].process
             run.kill(name)
             killed[name] += 1

@@ -75,11 +75,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _enclaves(arguments: argparse.Namespace, config: RackConfig) -> Sequence[Enclave]:
-    from automax_ros.ros.security.profiles import enclave_of_rack, enclaves_of_seats, operator_of, recorder_of
+    from automax_ros.ros.security.profiles import enclave_of_rack, enclaves_of_processes, operator_of, recorder_of
 
     ros = ros_arguments(arguments)
     rack = (
-        enclaves_of_seats(config, processes_of(config), ros)
+        enclaves_of_processes(config, processes_of(config), ros)
         if arguments.distributed
         else (enclave_of_rack(config, ros),)
     )

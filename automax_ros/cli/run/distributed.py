@@ -1,4 +1,4 @@
-"""A run of a distributed rack on the wall clock: starts and supervises one process for each seat of the rack."""
+"""A run of a distributed rack on the wall clock: starts and supervises each process of the rack."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from automax_ros.ros.setup.discovery import range_text
 from automax_ros.ros.setup.lock import InstanceLock, domain_id
 
 _Part = TypeVar("_Part")
-_SEATS, _HOME, _RECORDER = range(3)
+_OTHER_PROCESS, _MEMORY_PROCESS, _RECORDER = range(3)
 """The order in which processes end: tasks first, then common memory, then the recorder."""
 _RECORDER_NAME = "recorder"
 _RECORDER_WAIT_S = "60"
@@ -32,7 +32,7 @@ _RECORDER_WAIT_S = "60"
 _RECORDER_AFTER_NS = 25 * NS_PER_S
 """How long the recorder takes the last messages of common memory's process, which waits until they have arrived."""
 _WHOLE = "distributed"
-"""The seat under which the supervising process holds the lock."""
+"""The name under which the supervising process holds the lock."""
 
 
 def run_distributed(plan: RunPlan, arguments: argparse.Namespace, stop: StopRequest) -> int:
@@ -45,16 +45,16 @@ def run_distributed(plan: RunPlan, arguments: argparse.Namespace, stop: StopRequ
         rack = Rack(plan.config)
         warn(rack)
         stimulation(rack, plan.stimuli, allow_outside=plan.allow_outside)
-        seats = processes_of(plan.config, rack.operations.installation.programs.values())
-        watch = _Watch(plan, seats)
-        watch.message(_opening(plan, seats, domain))
-        posts = list(_posts(plan, seats, arguments))
+        processes = processes_of(plan.config, rack.operations.installation.programs.values())
+        watch = _Watch(plan, processes)
+        watch.message(_opening(plan, processes, domain))
+        posts = list(_posts(plan, processes, arguments))
         supervisor = Supervisor(posts, watch.receive, watch.print_error, watch.print_death, restart=arguments.restart)
         supervisor.run(lambda: stop.requested)
         return watch.conclude(supervisor)
 
 
-def _posts(plan: RunPlan, seats: Sequence[RackProcess], arguments: argparse.Namespace) -> Iterator[ProcessSpec]:
+def _posts(plan: RunPlan, processes: Sequence[RackProcess], arguments: argparse.Namespace) -> Iterator[ProcessSpec]:
     # Modules that happen to be in the working folder must not be imported.
     safe = ["-P"] if sys.version_info >= (3, 11) else []
     automax = [sys.executable, *safe, "-m", "automax_ros.cli.main"]
@@ -69,15 +69,20 @@ def _posts(plan: RunPlan, seats: Sequence[RackProcess], arguments: argparse.Name
         yield ProcessSpec(
             _RECORDER_NAME, command, _RECORDER, reports=False, begins_run=True, after_ns=_RECORDER_AFTER_NS
         )
-    for seat in seats:
-        own = ["--state", str(plan.state / seat.name)] if plan.state is not None else []
+    for process in processes:
+        own = ["--state", str(plan.state / process.name)] if plan.state is not None else []
         own += ["--await-recorder"] if plan.record is not None else []
         own += (
-            _given("--set", arguments.settings) + _given("--watch", arguments.watch) if seat.holds_common_memory else []
+            _given("--set", arguments.settings) + _given("--watch", arguments.watch)
+            if process.holds_common_memory
+            else []
         )
-        command = [*automax, "node", *common, "--module", seat.name, *own, *_ros(plan, arguments)]
+        command = [*automax, "node", *common, "--module", process.name, *own, *_ros(plan, arguments)]
         yield ProcessSpec(
-            seat.name, command, _HOME if seat.holds_common_memory else _SEATS, ends_run=seat.holds_common_memory
+            process.name,
+            command,
+            _MEMORY_PROCESS if process.holds_common_memory else _OTHER_PROCESS,
+            ends_run=process.holds_common_memory,
         )
 
 
@@ -108,19 +113,19 @@ def _seconds(time_ns: int) -> str:
     return f"{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d}"
 
 
-def _opening(plan: RunPlan, seats: Sequence[RackProcess], domain: int) -> str:
+def _opening(plan: RunPlan, processes: Sequence[RackProcess], domain: int) -> str:
     config = plan.config
     return (
-        f"rack {config.name} in {count_of(len(seats), 'process')}: "
-        f"{', '.join(seat.words for seat in seats)}\n"
+        f"rack {config.name} in {count_of(len(processes), 'process')}: "
+        f"{', '.join(process.words for process in processes)}\n"
         f"ROS 2 namespace /{config.namespace} in domain {domain}, seen by {range_text()}; Ctrl-C ends the run"
     )
 
 
 class _Watch:
-    def __init__(self, plan: RunPlan, seats: Sequence[RackProcess]) -> None:
-        self._plan, self._names = plan, [seat.name for seat in seats]
-        self._home = self._names[0]
+    def __init__(self, plan: RunPlan, processes: Sequence[RackProcess]) -> None:
+        self._plan, self._names = plan, [process.name for process in processes]
+        self._memory_process = self._names[0]
         self._screen = TerminalOutput()
         self.message = self._screen.message
         self._progress: dict[str, Progress] = {}
@@ -133,8 +138,8 @@ class _Watch:
             self.message(f"{name}: {told.text}")
         elif isinstance(told, Progress):
             self._progress[name] = told
-            home = self._progress.get(self._home)
-            if home is not None and home.now_ns >= NS_PER_S and self._screen.due():
+            memory_progress = self._progress.get(self._memory_process)
+            if memory_progress is not None and memory_progress.now_ns >= NS_PER_S and self._screen.due():
                 self._screen.progress(merged_progress(_in_order(self._names, self._progress)))
         elif isinstance(told, Summary):
             self._summaries[name] = told
@@ -153,7 +158,7 @@ class _Watch:
 
     def conclude(self, supervisor: Supervisor) -> int:
         """Show the summary, write the report, and return the exit code: the highest of all processes."""
-        if self._home in self._summaries:
+        if self._memory_process in self._summaries:
             self._screen.summary(merged_summary(_in_order(self._names, self._summaries)))
         for name, deaths in supervisor.deaths.items():
             self.message(f"  {name} died {count_of(deaths, 'time')}")

@@ -115,7 +115,7 @@ class LifecycleRunner:
         plan = None if self._session is None else self._session.plan
         if plan is None:
             return None
-        if plan.seat is not None and transition in (CLEANUP, SHUTDOWN):
+        if plan.process_plan is not None and transition in (CLEANUP, SHUTDOWN):
             return _PARTS_END
         return NOT_OPERATED if self._was_active and not plan.config.operator else None
 
@@ -224,10 +224,10 @@ def run_live(plan: RunPlan, stop: StopRequest) -> int:
 
     Returns the exit code. Raises the errors of ``LiveSession``.
     """
-    if plan.seat is None or plan.seat.seat.holds_common_memory:
+    if plan.process_plan is None or plan.process_plan.process.holds_common_memory:
         return run_managed(LifecycleRun(plan.config.namespace, lambda: plan, plan, plan.ros), stop)
     domain = domain_id()
-    with InstanceLock(plan.config.namespace, domain, plan.seat.seat.name):
+    with InstanceLock(plan.config.namespace, domain, plan.process_plan.process.name):
         return _run_part(plan, stop, domain)
 
 
@@ -237,8 +237,8 @@ def run_managed(managed: LifecycleRun, stop: StopRequest) -> int:
     Returns the exit code. Raises the errors of ``LiveSession`` where the rack starts at once.
     """
     domain, plan = domain_id(), managed.plan
-    seat = None if plan is None or plan.seat is None else plan.seat.seat.name
-    with InstanceLock(managed.namespace, domain, seat):
+    process_name = None if plan is None or plan.process_plan is None else plan.process_plan.process.name
+    with InstanceLock(managed.namespace, domain, process_name):
         process = RosProcess(managed.ros)
         try:
             return _run_managed(LifecycleRunner(managed, process, stop, domain), _waiting(managed, domain))

@@ -63,7 +63,7 @@ class LiveSession:
         self._ending = ExitStack()
         try:
             self.live = LiveRack(
-                rack, plan.ros, self._seating(), process=process, manager=manager, simulated=plan.simulated
+                rack, plan.ros, self._process_layout(), process=process, manager=manager, simulated=plan.simulated
             )
             self._ending.callback(self.live.close)
             begin_with(rack, plan.tunings)
@@ -149,14 +149,14 @@ class LiveSession:
         self._ending.push(rack.__exit__)
         return recorder
 
-    def _seating(self) -> ProcessLayout | None:
-        seat = self.plan.seat
-        if seat is None:
+    def _process_layout(self) -> ProcessLayout | None:
+        plan = self.plan.process_plan
+        if plan is None:
             return None
-        start_delay_ns = LEAD_NS if seat.start_delay_ns is None else seat.start_delay_ns
-        seats = [item.slots for item in seat.seats]
+        start_delay_ns = LEAD_NS if plan.start_delay_ns is None else plan.start_delay_ns
+        processes = [process.slots for process in plan.processes]
         return ProcessLayout(
-            seats, seat.run_id, lambda: self._stimulation.is_common, start_delay_ns, seat.awaits_recorder
+            processes, plan.run_id, lambda: self._stimulation.is_common, start_delay_ns, plan.awaits_recorder
         )
 
     def _all_are_there(self, stop: StopRequest) -> bool:
@@ -193,8 +193,8 @@ def _opening(plan: RunPlan, rack: Rack, domain: int) -> str:
         for module in rack.task_modules
     )
     head = f"rack {config.name}: {modules}"
-    if plan.seat is not None:
-        head = f"{plan.seat.seat.words} of rack {config.name}"
+    if plan.process_plan is not None:
+        head = f"{plan.process_plan.process.words} of rack {config.name}"
     return (
         f"{head}; {len(config.declared)} common variables\n"
         f"ROS 2 namespace /{config.namespace} in domain {domain}, seen by {range_text()}; Ctrl-C ends the run"

@@ -100,16 +100,18 @@ def run(arguments: argparse.Namespace) -> int:
         config = config_of(arguments.config, allow_outside=arguments.allow_outside, quiet=arguments.watched)
         if config is None:
             return 1
-        seats = processes_of(config)
+        processes = processes_of(config)
         if arguments.module is None:
-            _print_seats(seats)
+            _print_processes(processes)
             return 0
-        return _run(arguments, config, seats, stop)
+        return _run(arguments, config, processes, stop)
 
 
-def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[RackProcess, ...], stop: StopRequest) -> int:
-    seat = process_named(seats, arguments.module)
-    if arguments.settings and not seat.holds_common_memory:
+def _run(
+    arguments: argparse.Namespace, config: RackConfig, processes: tuple[RackProcess, ...], stop: StopRequest
+) -> int:
+    process = process_named(processes, arguments.module)
+    if arguments.settings and not process.holds_common_memory:
         raise UsageError("--set belongs to the process of common memory", "give it to `--module common_memory`")
     ros = ros_arguments(arguments)
     config = replace(config, namespace=ros.placed(config.namespace))
@@ -125,7 +127,7 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[RackPro
         arguments.report,
         arguments.allow_outside,
         ros,
-        ProcessPlan(seat, seats, arguments.run_id, arguments.watched, arguments.lead, arguments.await_recorder),
+        ProcessPlan(process, processes, arguments.run_id, arguments.watched, arguments.lead, arguments.await_recorder),
         native=native_forms(arguments, arguments.duration, wall_clock=True),
         verbose=arguments.verbose,
     )
@@ -142,10 +144,10 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[RackPro
         return 2
 
 
-def _print_seats(seats: tuple[RackProcess, ...]) -> None:
-    for seat in seats:
-        print(f"{seat.name:18}{' '.join(seat.modules)}")
-        for reason in seat.reasons:
+def _print_processes(processes: tuple[RackProcess, ...]) -> None:
+    for process in processes:
+        print(f"{process.name:18}{' '.join(process.modules)}")
+        for reason in process.reasons:
             print(f"{'':18}{reason}")
 
 

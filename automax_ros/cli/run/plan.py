@@ -33,14 +33,14 @@ from automax_ros.scenario.stimuli.wave_player import OperationRecord
 class ProcessPlan:
     """The part of a distributed rack that runs in this process.
 
-    ``seats`` are all processes of the rack. ``run_id`` is the number of the run, 0 for that of the processes that
+    ``processes`` are all processes of the rack. ``run_id`` is the number of the run, 0 for that of the processes that
     already run, or a new one. ``watched``: another process has started this one. ``start_delay_ns`` is how long after
     all processes are present the rack starts, None for the default. ``awaits_recorder``: the rack does not start before
     a recorder receives this process's messages.
     """
 
-    seat: RackProcess
-    seats: tuple[RackProcess, ...]
+    process: RackProcess
+    processes: tuple[RackProcess, ...]
     run_id: int = 0
     watched: bool = False
     start_delay_ns: int | None = None
@@ -54,10 +54,10 @@ class RunPlan:
     ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the folder given
     for values that outlive the run, if any. ``watch`` are the variables of ``--watch``, None without it. ``stimuli`` is
     the stimuli file, ``report`` the file for the report of the run's end; ``allow_outside`` allows stimuli to name
-    sources in other folders. ``ros`` are the ROS arguments of the command line. ``seat`` is the part of the rack that
-    is run, None for all of it. ``simulated`` is the simulated time of a rack with ROS nodes, None for the wall clock
-    and for a rack without nodes. ``tunings`` are the tunables set with ``--set``. ``native`` says which tasks scan as
-    machine code, ``verbose`` prints which of them do.
+    sources in other folders. ``ros`` are the ROS arguments of the command line. ``process_plan`` is the part of the
+    rack that is run, None for all of it. ``simulated`` is the simulated time of a rack with ROS nodes, None for the
+    wall clock and for a rack without nodes. ``tunings`` are the tunables set with ``--set``. ``native`` says which
+    tasks scan as machine code, ``verbose`` prints which of them do.
     """
 
     config: RackConfig
@@ -71,7 +71,7 @@ class RunPlan:
     report: Path | None = None
     allow_outside: bool = False
     ros: RosArguments = NO_ARGUMENTS
-    seat: ProcessPlan | None = None
+    process_plan: ProcessPlan | None = None
     simulated: SimulatedTime | None = None
     tunings: tuple[Tuning, ...] = ()
     native: NativeForms = IN_PYTHON
@@ -80,12 +80,12 @@ class RunPlan:
     @property
     def is_watched(self) -> bool:
         """Whether another process has started this one and shows its output."""
-        return self.seat is not None and self.seat.watched
+        return self.process_plan is not None and self.process_plan.watched
 
     @property
     def slots(self) -> tuple[int, ...] | None:
         """The slots whose modules are run, None for all."""
-        return None if self.seat is None else self.seat.seat.slots
+        return None if self.process_plan is None else self.process_plan.process.slots
 
     @property
     def state_folder(self) -> Path | None:
@@ -93,15 +93,15 @@ class RunPlan:
         if self.state is not None or self.simulated is not None:
             return self.state
         whole = default_folder(self.config)
-        return whole if self.seat is None else whole / self.seat.seat.name
+        return whole if self.process_plan is None else whole / self.process_plan.process.name
 
     def shown(self, rack: Rack) -> Sequence[CommonElement]:
         """Return the commons that the status line shows for a rack, or for this process's part of it."""
         if self.watch is not None:
             return self.watch
-        if self.seat is not None and not self.seat.seat.holds_common_memory:
+        if self.process_plan is not None and not self.process_plan.process.holds_common_memory:
             return ()
-        if self.seat is None or rack.config.watch is not None:
+        if self.process_plan is None or rack.config.watch is not None:
             return watched(rack.config, None, rack.operations.installation.programs.values())
         programs = [item.result.program for item in check_tasks(rack.config)]  # tasks are in other processes
         return watched(rack.config, None, [program for program in programs if program is not None])

@@ -3,7 +3,7 @@
 Both ends have the same rack file, so variables are identified by numbers. Times in messages are instants of rack time:
 all processes of a run share its start.
 
-Any program that can publish on the bus can send any numbers. Seats and slots that the rack does not have, and times
+Any program that can publish on the bus can send any numbers. Processes and slots that the rack does not have, and times
 outside of a run, are refused on reception, only here: a time that no later one can exceed, for example, would override
 all later writes for ever (decision: limits as below).
 """
@@ -39,11 +39,11 @@ BUS = QosProfile("reliable", "volatile", "keep_last", 1000)
 
 
 class BusLimits:
-    """Checks messages. ``seats`` are the slots of all processes of the rack, by the slot that names each."""
+    """Checks messages. ``process_slots`` are the slots of all processes of the rack, by the slot that names each."""
 
-    def __init__(self, seats: Mapping[int, tuple[int, ...]]) -> None:
-        self._seats = {seat: tuple(sorted(slots)) for seat, slots in seats.items()}
-        self._slots = {0}.union(*seats.values())  # 0 is that of values as installed
+    def __init__(self, process_slots: Mapping[int, tuple[int, ...]]) -> None:
+        self._process_slots = {process_slot: tuple(sorted(slots)) for process_slot, slots in process_slots.items()}
+        self._slots = {0}.union(*process_slots.values())  # 0 is that of values as installed
 
     def of_presence(self, presence: Presence, wall_ns: int, latest_ns: int) -> str:
         """Return why a presence cannot be valid, "" if it can.
@@ -53,7 +53,7 @@ class BusLimits:
             wall_ns: the wall clock of this process.
             latest_ns: the latest possible rack time.
         """
-        slots = self._seats.get(presence.seat)
+        slots = self._process_slots.get(presence.seat)
         if slots is None:
             return f"a process in slot {presence.seat}, which is none of the rack"
         if tuple(sorted(presence.slots)) != slots:
@@ -70,7 +70,7 @@ class BusLimits:
 
     def of_write(self, message: BusWrite, latest_ns: int) -> str:
         """Return why a write cannot be valid, "" if it can."""
-        if message.seat not in self._seats:
+        if message.seat not in self._process_slots:
             return f"a write by slot {message.seat}, which is none of the rack"
         if not 0 <= message.stamp <= latest_ns:
             return "a write at a time that cannot be"
@@ -90,7 +90,9 @@ class BusLimits:
 def write_message(batch: Batch, run_id: int, process: int) -> BusWrite:
     """Return a batch as a message of one process in one run."""
     values = values_of(batch.entries)
-    return BusWrite(batch.time_ns, run_id, process, batch.seat, batch.sequence, batch.writer, int(batch.kind), values)
+    return BusWrite(
+        batch.time_ns, run_id, process, batch.process_slot, batch.sequence, batch.writer, int(batch.kind), values
+    )
 
 
 def batch_of(message: BusWrite, texts: Collection[int]) -> Batch:
@@ -151,7 +153,7 @@ def with_stop_state(presence: Presence, standing: StopState) -> Presence:
     return presence._replace(
         stopped=cause is not None,
         standing_ns=standing.at_ns,
-        standing_seat=standing.seat,
+        standing_seat=standing.process_slot,
         stopped_code=(cause.code or "") if cause else "",
         stopped_task=cause.task if cause else "",
         stopped_reason=cause.reason[:500] if cause else "",

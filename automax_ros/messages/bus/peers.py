@@ -34,7 +34,7 @@ class PresenceVerdict(enum.Enum):
     """It is of a rack of this name, but not of this run."""
     OTHER_FILE = "other file"
     """It has another rack file or other sources."""
-    SEAT_TAKEN = "seat taken"
+    SLOT_TAKEN = "slot taken"
     """It has modules that are in this process."""
 
 
@@ -75,21 +75,21 @@ class Peer:
 
 @dataclass
 class Peers:
-    """All other processes of one run, by seat.
+    """All other processes of one run, by the slot that names each.
 
-    ``process``, ``seat`` and ``slots`` are this process's own, ``fingerprint`` that of its rack file and sources;
-    ``run_id`` is 0 while it knows no run: then it joins the first one that a presence names. ``lost`` are seats whose
+    ``process``, ``process_slot`` and ``slots`` are this process's own, ``fingerprint`` that of its rack and sources;
+    ``run_id`` is 0 while it knows no run: then it joins the first one that a presence names. ``lost`` are those whose
     process disappeared without leaving and has not come back. ``lives`` returns whether a process of this host lives,
     None for others.
     """
 
     process: int
-    seat: int
+    process_slot: int
     slots: Collection[int]
     fingerprint: int
     run_id: int = 0
     epoch_ns: int = 0
-    by_seat: dict[int, Peer] = field(default_factory=dict)
+    by_slot: dict[int, Peer] = field(default_factory=dict)
     lost: set[int] = field(default_factory=set)
     lives: Callable[[Presence], bool | None] = lambda _: None
     _looked_ns: int = 0
@@ -103,12 +103,12 @@ class Peers:
             self.run_id = presence.run_id
         if presence.epoch_ns and not self.epoch_ns:
             self.epoch_ns = presence.epoch_ns
-        peer = self.by_seat.get(presence.seat)
+        peer = self.by_slot.get(presence.seat)
         if peer is not None and peer.process == presence.process:
             peer.presence, peer.heard_ns = presence, now_ns
             return PresenceVerdict.KNOWN
         # Batches from before its first presence were not received: the first one that it announces is missing.
-        self.by_seat[presence.seat] = Peer(presence, now_ns)
+        self.by_slot[presence.seat] = Peer(presence, now_ns)
         self.lost.discard(presence.seat)
         return PresenceVerdict.NEW
 
@@ -125,7 +125,7 @@ class Peers:
 
     def _short(self, presence: Presence) -> Peer | None:
         """Return the process whose latest presence this is, if it announces batches that were not received."""
-        peer = self.by_seat.get(presence.seat)
+        peer = self.by_slot.get(presence.seat)
         return peer if peer is not None and peer.presence is presence and presence.sequence > peer.received else None
 
     def _refused(self, presence: Presence) -> PresenceVerdict | None:
@@ -136,16 +136,16 @@ class Peers:
         if presence.fingerprint != self.fingerprint:
             return PresenceVerdict.OTHER_FILE
         if set(presence.slots) & set(self.slots):
-            return PresenceVerdict.SEAT_TAKEN
+            return PresenceVerdict.SLOT_TAKEN
         return None
 
     def look(self, now_ns: int) -> list[Peer]:
         """Remove and return the processes lost since the last call. To be called at each beat."""
         held_up = now_ns - self._looked_ns > HELD_UP_NS
         self._looked_ns = now_ns
-        gone = [peer for peer in self.by_seat.values() if self._is_gone(peer, now_ns, held_up=held_up)]
+        gone = [peer for peer in self.by_slot.values() if self._is_gone(peer, now_ns, held_up=held_up)]
         for peer in gone:
-            del self.by_seat[peer.presence.seat]
+            del self.by_slot[peer.presence.seat]
             if peer.stage != Stage.LEAVING:
                 self.lost.add(peer.presence.seat)
         return [peer for peer in gone if peer.stage != Stage.LEAVING]
@@ -158,12 +158,12 @@ class Peers:
 
     def of(self, process: int) -> Peer | None:
         """Return the process with a number; None if it is not of this run."""
-        return next((peer for peer in self.by_seat.values() if peer.process == process), None)
+        return next((peer for peer in self.by_slot.values() if peer.process == process), None)
 
     def running(self) -> Iterator[Peer]:
-        """Yield those that scan, by seat."""
-        return (peer for _, peer in sorted(self.by_seat.items()) if peer.stage == Stage.RUNNING)
+        """Yield those that scan, by slot."""
+        return (peer for _, peer in sorted(self.by_slot.items()) if peer.stage == Stage.RUNNING)
 
     def owing(self) -> Peer | None:
         """Return a process with missing batches; None if there is none."""
-        return next((peer for _, peer in sorted(self.by_seat.items()) if peer.gap), None)
+        return next((peer for _, peer in sorted(self.by_slot.items()) if peer.gap), None)

@@ -38,9 +38,12 @@ MOST_AHEAD_NS = 10 * NS_PER_S
 
 @dataclass(frozen=True)
 class Batch:
-    """Writes of one writer at one instant, in order: (view, element, value). ``seat`` is the process that wrote."""
+    """Writes of one writer at one instant, in order: (view, element, value).
 
-    seat: int
+    ``process_slot`` names the process that wrote.
+    """
+
+    process_slot: int
     sequence: int
     time_ns: int
     writer: int
@@ -50,7 +53,7 @@ class Batch:
     @property
     def version(self) -> Version:
         """Version of its values."""
-        return self.time_ns, self.seat, self.sequence
+        return self.time_ns, self.process_slot, self.sequence
 
 
 @dataclass(frozen=True)
@@ -78,17 +81,17 @@ class StopState:
     """Whether the whole rack is stopped, for ``cause``, or runs (None), and since when."""
 
     at_ns: int = 0
-    seat: int = 0
+    process_slot: int = 0
     cause: StopCause | None = None
 
     @property
     def order(self) -> tuple[int, int]:
         """Sorts states: the greatest is valid."""
-        return self.at_ns, self.seat
+        return self.at_ns, self.process_slot
 
 
 class ImageSync:
-    """The link of one process. ``seat`` is the slot that names it, ``standing`` the rack's stop state as known here.
+    """The link of one process. ``process_slot`` names it, ``standing`` is the rack's stop state as known here.
 
     ``send`` receives each batch immediately; it may not write to the rack. ``is_common`` returns whether every process
     makes the present writes. ``guard`` executes deferred writes and handles exceptions: a message may be damaged.
@@ -97,13 +100,13 @@ class ImageSync:
     def __init__(
         self,
         rack: Rack,
-        seat: int,
+        process_slot: int,
         send: Callable[[Batch], None],
         is_common: Callable[[], bool] = lambda: False,
         guard: Callable[[Callable[[], None]], None] = lambda take: take(),
     ) -> None:
         """Create the link of a rack; it does not observe the rack yet."""
-        self._rack, self._memory, self.seat = rack, rack.memory, seat
+        self._rack, self._memory, self.process_slot = rack, rack.memory, process_slot
         self._send, self._is_common, self._guard = send, is_common, guard
         self._versions = Versions(rack.memory.registers)
         self._forces: dict[Key, tuple[Version, bool, Value]] = {}
@@ -135,8 +138,8 @@ class ImageSync:
         cause = self._rack.operations.stopped
         if not self._adopting and cause != self.standing.cause:
             # Two at one instant, or before the start, have an order too.
-            seat = self._rack.config.common_memory_slot if self._is_common() else self.seat
-            self.standing = StopState(max(operation.at_ns, self.standing.at_ns + 1), seat, cause)
+            process_slot = self._rack.config.common_memory_slot if self._is_common() else self.process_slot
+            self.standing = StopState(max(operation.at_ns, self.standing.at_ns + 1), process_slot, cause)
 
     def receive(self, batch: Batch) -> None:
         """Apply another process's writes that are newer, between two scans: after those that are due before them."""
@@ -166,12 +169,14 @@ class ImageSync:
             event.cancel()
             self._guard(take)
 
-    def last_of(self, seat: int) -> ImageCopy:
+    def last_of(self, process_slot: int) -> ImageCopy:
         """Return what a process wrote within the last second: others may lack the batch that it sent as it ended."""
         self.take_waiting()
         whole, since_ns = self.picture(), self._rack.now_ns - NS_PER_S
-        values = tuple(held for held in whole.values if held.version[1] == seat and held.version[0] >= since_ns)
-        forces = tuple(force for force in whole.forces if force.version[1] == seat and force.version[0] >= since_ns)
+        values = tuple(held for held in whole.values if held.version[1] == process_slot and held.version[0] >= since_ns)
+        forces = tuple(
+            force for force in whole.forces if force.version[1] == process_slot and force.version[0] >= since_ns
+        )
         return ImageCopy(whole.sequence, values, forces)
 
     def adopt(self, standing: StopState) -> None:
@@ -302,8 +307,9 @@ class ImageSync:
             self.sequence += 1
         if self._adopting:  # values that a STOP ALL clears here are not older than the STOP ALL
             time_ns = max(time_ns, self.standing.at_ns)
-        home = self._rack.config.common_memory_slot
-        version = AS_INSTALLED if preset else (time_ns, home, 0) if common else (time_ns, self.seat, self.sequence)
+        memory_slot = self._rack.config.common_memory_slot
+        own = (time_ns, memory_slot, 0) if common else (time_ns, self.process_slot, self.sequence)
+        version = AS_INSTALLED if preset else own
         repairs: list[Part | VersionedValue] = []
         sent = []
         for view, element, value in entries:
@@ -314,7 +320,7 @@ class ImageSync:
             if fit is not TAKEN:
                 repairs += self._versions.newest(view, element, value)
         if sends:
-            self._send(Batch(self.seat, self.sequence, time_ns, writer, kind, tuple(sent)))
+            self._send(Batch(self.process_slot, self.sequence, time_ns, writer, kind, tuple(sent)))
         if repairs:
             self._repair(repairs)
 

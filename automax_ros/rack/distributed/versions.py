@@ -1,6 +1,6 @@
 """Versions of the values in common memory, by which the images of several processes come to agree.
 
-A version is (rack time, seat of the process that wrote, number of its message); the greatest wins, wherever and in
+A version is (rack time, slot of the process that wrote, number of its message); the greatest wins, wherever and in
 whatever order writes arrive (decision). Each bit of a module's register has its own version, since a point may be one
 bit; a REAL or DOUBLE INTEGER point is two registers.
 """
@@ -15,7 +15,7 @@ from automax_ros.core.types import Value
 from automax_ros.runtime.memory.registers import WORD, Part, RegisterMap
 
 Version = tuple[int, int, int]
-"""Rack time (ns), seat, number of the message."""
+"""Rack time (ns), slot of the process, number of the message."""
 AS_INSTALLED: Version = (-1, 0, 0)
 """Version of presets: every process writes them, and any other write wins over them."""
 Key = tuple[int, int]

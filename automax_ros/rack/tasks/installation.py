@@ -148,9 +148,9 @@ class Installation:
 
     def _refuse_bonds(self, task: str, source: SourceText, programs: Mapping[str, Program]) -> None:
         """Refuse a source with which modules of other processes would have to share this one (decision)."""
-        for seat in processes_of(self._config, programs.values()) if self._cut else ():
-            if not any({*seat.slots} <= {*process.slots} for process in self._cut):
-                why = f"{seat.reasons[-1]}, so {' and '.join(seat.modules)} would have to share a process"
+        for process in processes_of(self._config, programs.values()) if self._cut else ():
+            if not any({*process.slots} <= {*part.slots} for part in self._cut):
+                why = f"{process.reasons[-1]}, so {' and '.join(process.modules)} would have to share a process"
                 raise RackError(f"{source.name}: {why}: restart the rack with it; task {task} stays as it is")
 
     def _compile(self, task: str, program: Program) -> CompiledTask:

@@ -32,11 +32,11 @@ def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
 
     Only modules with interrupts, or with ``by_itself``, write registers; only plants with feeds write.
     """
-    home = config.common_memory_slot
+    memory_slot = config.common_memory_slot
     outside = [
-        WriterSpec(PRESET_WRITER, "rack", WriterKind.PRESET, home),
-        WriterSpec(ROS_WRITER, "ros", WriterKind.ROS, home),
-        WriterSpec(OPERATOR_WRITER, "operator", WriterKind.OPERATOR, home),
+        WriterSpec(PRESET_WRITER, "rack", WriterKind.PRESET, memory_slot),
+        WriterSpec(ROS_WRITER, "ros", WriterKind.ROS, memory_slot),
+        WriterSpec(OPERATOR_WRITER, "operator", WriterKind.OPERATOR, memory_slot),
     ]
     tasks = [
         (module.slot, task.name)
@@ -44,7 +44,7 @@ def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
         for task in sorted(module.tasks, key=lambda task: task.name)
     ]
     modules = [(module.slot, module.name) for module in config.modules if module.registers.writes]
-    plants = [(home, plant) for plant in dict.fromkeys(feed.plant for feed in config.feeds)]
+    plants = [(memory_slot, plant) for plant in dict.fromkeys(feed.plant for feed in config.feeds)]
     first = _FIRST_TASK + len(tasks)
     return (
         *outside,

@@ -47,7 +47,7 @@ class RackClock:
     """Creates the pacer of one rack and connects it to ``/clock``."""
 
     def __init__(self, scheduler: Scheduler, lock: RackLock, *, follows: bool, simulated: SimulatedTime | None) -> None:
-        self._site: RackContext | None = None
+        self._rack_context: RackContext | None = None
         self._node: ModuleNode | None = None
         self._topic = CLOCK
         self._publish: Callable[[bytes], object] = _not_published
@@ -67,16 +67,16 @@ class RackClock:
         """Whether the rack can start: if it follows ``/clock``, after its first message."""
         return self._follower is None or self._follower.has_clock
 
-    def join(self, site: RackContext, node: ModuleNode) -> None:
+    def join(self, rack_context: RackContext, node: ModuleNode) -> None:
         """Publish ``/clock`` or subscribe to it, by a node of the rack."""
-        self._site, self._node = site, node
+        self._rack_context, self._node = rack_context, node
         if isinstance(self.pace, SimulatedPacer):
             publisher = node.create_publisher(message_class(_TYPE), CLOCK, ros_qos(_PUBLISHED))
             self._publish, self._topic = publisher.publish, publisher.topic_name
         elif self._follower is not None:
             subscription = node.own_subscription(message_class(_TYPE), CLOCK, ros_qos(_FOLLOWED))
             self._topic = subscription.topic_name
-            site.intake.add(
+            rack_context.intake.add(
                 TopicReader(subscription, _MOST_BYTES, lambda taken: self._receive(taken.payload)), last=True
             )
 
@@ -91,12 +91,12 @@ class RackClock:
         return True
 
     def _publish_time(self, now_ns: int) -> None:
-        assert self._site is not None
-        self._publish(self._encode(Clock(self._site.stream.stamp(now_ns))))
+        assert self._rack_context is not None
+        self._publish(self._encode(Clock(self._rack_context.stream.stamp(now_ns))))
         self._check_publishers(own=1)
 
     def _receive(self, payload: bytes | None) -> None:
-        assert self._site is not None
+        assert self._rack_context is not None
         try:
             message = decode(_TYPE, payload or b"")
             assert isinstance(message, Clock)
@@ -105,7 +105,7 @@ class RackClock:
             self._follow(message.clock)
         except CdrError as error:
             text = f"{CLOCK}: {error}"
-            self._site.health.note(MALFORMED, CLOCK, lambda: text)
+            self._rack_context.health.note(MALFORMED, CLOCK, lambda: text)
             return
         self._check_publishers(own=0)
 
@@ -115,32 +115,32 @@ class RackClock:
         Raises:
             CdrError: time stamps, which are ahead of a clock that went back, would exceed the range of ROS.
         """
-        assert self._site is not None
+        assert self._rack_context is not None
         assert self._follower is not None
-        with self._site.lock.for_scan:
-            stamp = self._site.stream.stamp(self._follower.now_ns) + self._follower.ahead_ns(clock_ns)
+        with self._rack_context.lock.for_scan:
+            stamp = self._rack_context.stream.stamp(self._follower.now_ns) + self._follower.ahead_ns(clock_ns)
             if stamp >= _LATEST_NS:
                 raise CdrError(f"{clock_ns} ns comes after a clock that went back, and would be a stamp of {stamp} ns")
             self._follower.heard(clock_ns)
 
     def _check_publishers(self, own: int) -> None:
         assert self._node is not None
-        assert self._site is not None
+        assert self._rack_context is not None
         if self._throttle.passes() and self._node.count_publishers(self._topic) > 1:
             text = "another node sends /clock too" if own else "several nodes send /clock"
-            if not self._site.health.counts[TAKEN]:
+            if not self._rack_context.health.counts[TAKEN]:
                 self._node.get_logger().warning(text)
-            self._site.health.note(TAKEN, CLOCK, lambda: text)
+            self._rack_context.health.note(TAKEN, CLOCK, lambda: text)
 
     def _jumped(self, by_ns: int) -> None:
-        assert self._site is not None
+        assert self._rack_context is not None
         assert self._node is not None
         if by_ns > 0:
-            self._site.stream.leave_out(by_ns)
+            self._rack_context.stream.leave_out(by_ns)
             text = f"/clock went ahead by {by_ns / NS_PER_S:.9g} s: the rack leaves that time out"
         else:
             text = f"/clock went back by {-by_ns / NS_PER_S:.9g} s: rack time and stamps go on from where they are"
-        self._site.health.note(JUMP, by_ns > 0, lambda: text)
+        self._rack_context.health.note(JUMP, by_ns > 0, lambda: text)
         if self._log_throttle.passes():
             self._node.get_logger().warning(text)
 

@@ -70,8 +70,8 @@ class Background:
 class ManagedModuleNode(LifecycleNode, ModuleNode):
     """Node of one module; a lifecycle manager can stop, delete, reload and run its tasks."""
 
-    def __init__(self, site: RackContext, module: Module) -> None:
-        ModuleNode.__init__(self, site, module.config.name)
+    def __init__(self, rack_context: RackContext, module: Module) -> None:
+        ModuleNode.__init__(self, rack_context, module.config.name)
         self.work = Background(self)
         self._duties_of_tasks = ModuleLifecycle(self, module)
         self.manage(self._duties_of_tasks, self.guard, self._enter)
@@ -97,7 +97,7 @@ class ManagedModuleNode(LifecycleNode, ModuleNode):
         super().destroy_node()
 
     def _enter(self, action: Callable[[], None]) -> None:
-        with self.site.between_scans():
+        with self.rack_context.between_scans():
             action()
 
 
@@ -105,8 +105,8 @@ class ModuleLifecycle:
     """The transitions of a module's node: their effect on its tasks."""
 
     def __init__(self, node: ManagedModuleNode, module: Module) -> None:
-        self._node, self._site = node, node.site
-        self._tasks, self._reloads = ModuleTasks(node.site.rack, module), Reloads(node.site.rack)
+        self._node, self._rack_context = node, node.rack_context
+        self._tasks, self._reloads = ModuleTasks(node.rack_context.rack, module), Reloads(node.rack_context.rack)
 
     @property
     def state(self) -> str | None:
@@ -119,9 +119,9 @@ class ModuleLifecycle:
 
     def refusal(self, _: str) -> str | None:
         """Refuse transitions of a rack that has no operator or was not started."""
-        if not self._site.rack.config.operator:
+        if not self._rack_context.rack.config.operator:
             return NOT_OPERATED
-        return None if self._site.stream.has_begun else _BEFORE_THE_RACK
+        return None if self._rack_context.stream.has_begun else _BEFORE_THE_RACK
 
     def configure(self) -> Pending:
         """Reload the deleted tasks from their files; if one has an error, none is installed."""
@@ -146,7 +146,7 @@ class ModuleLifecycle:
 
     def fail(self) -> None:
         """STOP ALL, so that no output stays on, and delete the module's tasks."""
-        operations = self._site.rack.operations
+        operations = self._rack_context.rack.operations
         if operations.powered:
             operations.stop_all(f"a transition of {self._node.get_name()} failed")
             self._tasks.delete()
@@ -159,7 +159,7 @@ class ModuleLifecycle:
         name = names[0]
 
         def prepared(found: PreparedReload | None, error: Exception | None) -> None:
-            with self._site.between_scans():
+            with self._rack_context.between_scans():
                 try:
                     if error is not None:
                         raise error

@@ -173,10 +173,12 @@ class RackContext:
 class ModuleNode(RackRosNode):
     """A module's node: in the rack's namespace, on its time, and guarded against bad parameter requests."""
 
-    def __init__(self, site: RackContext, name: str) -> None:
-        super().__init__(name, site.rack.config.namespace, site.context, site.health, site.arguments)
-        self.site = site
-        self.served_by(site.intake)
+    def __init__(self, rack_context: RackContext, name: str) -> None:
+        super().__init__(
+            name, rack_context.rack.config.namespace, rack_context.context, rack_context.health, rack_context.arguments
+        )
+        self.rack_context = rack_context
+        self.served_by(rack_context.intake)
 
     @property
     def subscriptions(self) -> Iterator[Any]:
@@ -205,21 +207,21 @@ class ModuleNode(RackRosNode):
         )
         kind = message_class(topic.type_name)
         qos = ros_qos(topic.qos)
-        if self.site.is_recorded and topic.qos is SCAN:
+        if self.rack_context.is_recorded and topic.qos is SCAN:
             qos.depth = RECORDED_DEPTH
         publish = self.create_publisher(kind, topic.name, qos, event_callbacks=events).publish
         return lambda _, payload: publish(payload)
 
     def diagnose(self, statuses: Source) -> None:
         """Publish on ``/diagnostics`` what ``statuses`` returns for a rack time (ns)."""
-        site = self.site
-        if not site.diagnostics.begun:
-            site.diagnostics.begin(site.rack, site.stream, site.pacer, self)
-        site.diagnostics.add(statuses)
+        rack_context = self.rack_context
+        if not rack_context.diagnostics.begun:
+            rack_context.diagnostics.begin(rack_context.rack, rack_context.stream, rack_context.pacer, self)
+        rack_context.diagnostics.add(statuses)
 
     def status(self, part: str, level: bytes, text: str, slot: int, values: Mapping[str, str]) -> DiagnosticStatus:
         """Return the health of a part of the module in a slot."""
-        config = self.site.rack.config
+        config = self.rack_context.rack.config
         name = f"{config.namespace}/{self.get_name()}: {part}"
         return status_of(name, f"{config.name} slot {slot}", level, text, values)
 
@@ -229,14 +231,14 @@ class ModuleNode(RackRosNode):
         """Report a subscriber or publisher with an incompatible quality of service; ``what`` says what is lost."""
         policy = str(qos_policy_name_from_kind(info.last_policy_kind)).lower()
         text = f"{what}: its quality of service does not fit ({policy})"
-        self.site.health.note("QoS conflict", what, lambda: text, times=info.total_count_change)
+        self.rack_context.health.note("QoS conflict", what, lambda: text, times=info.total_count_change)
         self.get_logger().warning(text)
 
     def guarded_callback(self, what: str, action: Callable[..., None]) -> Callable[..., None]:
         """Wrap a function as a callback that runs between two scans and reports its exceptions."""
 
         def entered(*arguments: Any) -> None:
-            with self.site.between_scans():
+            with self.rack_context.between_scans():
                 try:
                     action(*arguments)
                 except Exception as error:

@@ -23,21 +23,21 @@ class RackHealth:
     were skipped or something was refused since the last report; else OK.
     """
 
-    def __init__(self, site: RackContext, part: str) -> None:
-        self._site, self._part = site, part
+    def __init__(self, rack_context: RackContext, part: str) -> None:
+        self._rack_context, self._part = rack_context, part
 
     def statuses(self, now_ns: int) -> list[DiagnosticStatus]:
         """Return the rack's status."""
-        rack, operations = self._site.rack, self._site.rack.operations
-        counts = self._site.health.counts
+        rack, operations = self._rack_context.rack, self._rack_context.rack.operations
+        counts = self._rack_context.health.counts
         skipped = sum(item.skipped for item in rack.statistics.values())
         level, text = self._judged(skipped, sum(counts.values()))
         cause = operations.stopped
         values = {
             "time_s": f"{now_ns / 1e9:.3f}",
-            "run_id": str(self._site.stream.run_id),
+            "run_id": str(self._rack_context.stream.run_id),
             "powered": str(operations.powered),
-            "halted": str(is_halted(self._site.pacer)),
+            "halted": str(is_halted(self._rack_context.pacer)),
             "tasks": str(len(rack.tasks)),
             "running": str(sum(task.status is Status.RUNNING for task in rack.tasks)),
             "forced": str(len(rack.forces())),
@@ -52,7 +52,7 @@ class RackHealth:
         return [status_of(name, rack.config.name, level, text, values)]
 
     def _judged(self, skipped: int, troubles: int) -> tuple[bytes, str]:
-        operations, diagnostics = self._site.rack.operations, self._site.diagnostics
+        operations, diagnostics = self._rack_context.rack.operations, self._rack_context.diagnostics
         newly_skipped = diagnostics.newly(OVERRUNS, skipped)
         newly_troubled = diagnostics.newly("troubles", troubles)
         cause = operations.stopped
@@ -60,13 +60,13 @@ class RackHealth:
             return DiagnosticStatus.ERROR, f"{cause.title}: {cause.reason}"
         if not operations.powered:
             return DiagnosticStatus.WARN, "the power is off"
-        if is_halted(self._site.pacer):
+        if is_halted(self._rack_context.pacer):
             return DiagnosticStatus.WARN, "halted: rack time stands still"
         if cause is not None:
             return DiagnosticStatus.WARN, f"{cause.title}: {cause.reason}"
         if newly_skipped:
             return DiagnosticStatus.WARN, f"{count_of(newly_skipped, 'scan')} skipped since the last report"
         if newly_troubled:
-            kinds = ", ".join(f"{number} {kind}" for kind, number in sorted(self._site.health.counts.items()))
+            kinds = ", ".join(f"{number} {kind}" for kind, number in sorted(self._rack_context.health.counts.items()))
             return DiagnosticStatus.WARN, f"since the start: {kinds}"
         return DiagnosticStatus.OK, "running"

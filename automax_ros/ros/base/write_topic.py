@@ -68,14 +68,14 @@ class WriteTopic:
 
     def _report(self, kind: str, key: str, text: str, times: int = 1) -> None:
         """Count a problem; log it, at most once per second."""
-        self._node.site.health.note(kind, key, lambda: text, times=times)
+        self._node.rack_context.health.note(kind, key, lambda: text, times=times)
         if self._throttle.passes():
             self._node.get_logger().warning(text)
 
     def _subscribe(self, qos: QosProfile, events: SubscriptionEventCallbacks | None) -> None:
         subscription = self._node.own_subscription(self._class, self._topic, ros_qos(qos), events)
         receive = partial(self.receive, reliable=qos is COMMAND)
-        self._node.site.intake.add(TopicReader(subscription, self._most_bytes, receive))
+        self._node.rack_context.intake.add(TopicReader(subscription, self._most_bytes, receive))
 
     def _incompatible(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
         if info.last_policy_kind != QoSPolicyKind.RELIABILITY:
@@ -119,7 +119,7 @@ def subscribe_variable(
 
     ``elements_of`` returns the (element, value) that a message writes; it raises MemoryValueError if it is refused.
     """
-    rack = node.site.rack
+    rack = node.rack_context.rack
     variable = rack.config.variables[view]
 
     def take(message: Any) -> None:
@@ -149,7 +149,7 @@ class ScaledWriter:
         if clamped:
             text = f"{self._topic}: {value:.8g} {self._unit}".rstrip()
             text += f" lies beyond the scale: {self._variable.name} is {counts} counts"
-            self._node.site.health.note("clamped value", self._variable.name, lambda: text)
+            self._node.rack_context.health.note("clamped value", self._variable.name, lambda: text)
             if not self._is_logged:
                 self._is_logged = True
                 self._node.get_logger().warning(text)

@@ -23,7 +23,7 @@ _SETTLED_NS = 2 * NS_PER_S
 """A rack whose nodes have been seen this long without its operator has none (decision)."""
 ALONE_NS = participants.ALONE_NS
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
-_HOME, _OPERATOR = "common_memory", "operator"
+_MEMORY_NODE, _OPERATOR = "common_memory", "operator"
 
 
 class NotOperable(UserError):
@@ -82,7 +82,7 @@ class RackClient:
             now = time.monotonic_ns()
             racks, operators = self._racks(), self._nodes(_OPERATOR)
             # Node names arrive in a separate message, on a busy host long after the topics.
-            if seen is None and racks and self._nodes(_HOME):
+            if seen is None and racks and self._nodes(_MEMORY_NODE):
                 seen = now
             self.refuse_several(max(racks, operators))
             if operators:

@@ -76,7 +76,7 @@ class RecordedRun:
 
     def __init__(self, node: Node, space: str) -> None:
         self._node, self._space = node, space
-        self._home = b""
+        self._main_participant = b""
         self._others: set[bytes] = set()
         self._last_ns = self._next_ns = 0
         self._has_rival = False
@@ -92,7 +92,7 @@ class RecordedRun:
 
     def bind(self, sender: bytes) -> None:
         """Bind to the program that published a rack's table."""
-        self._home, self._others, self._last_ns = participant(sender), set(), time.monotonic_ns()
+        self._main_participant, self._others, self._last_ns = participant(sender), set(), time.monotonic_ns()
 
     def admit(self, sender: bytes) -> None:
         """Accept another process of the same run."""
@@ -104,17 +104,17 @@ class RecordedRun:
     def is_there(self) -> bool:
         """Whether the rack's program is in the graph. Another rack of its name is reported once."""
         racks = self.racks()
-        if self._home in racks and len(racks) > 1 and not self._has_rival:
+        if self._main_participant in racks and len(racks) > 1 and not self._has_rival:
             self._has_rival = True
             self.news.append(f"another rack is called {self._space} too: it is not recorded")
-        return not self.knows_senders or self._home in racks
+        return not self.knows_senders or self._main_participant in racks
 
     def is_ours(self, topic: str, taken: RawMessage) -> bool:
         """Return whether a message comes from the rack; those of other programs are counted for ``look``."""
         if not self.knows_senders:
             return True
         sender = participant(taken.sender)
-        if sender == self._home or sender in self._others:
+        if sender == self._main_participant or sender in self._others:
             self._last_ns = time.monotonic_ns()
             return True
         if sender not in self._unknown and len(self._unknown) >= MOST_PROCESSES:
@@ -152,7 +152,7 @@ class RecordedRun:
             return None
         self._next_ns = now + LOOK_NS
         racks = self.racks()
-        if self._home in racks and now - self._last_ns < SILENT_NS:
+        if self._main_participant in racks and now - self._last_ns < SILENT_NS:
             return None
         found = next((sender for sender in self._tables if sender in racks), None)
         return None if found is None else self._tables.pop(found)

@@ -2,8 +2,8 @@
 
 Each process publishes and subscribes to ``bus`` (automax_msgs/BusWrite: its writes to common memory), ``bus/image``
 (automax_msgs/BusImage: the memory it holds, on request) and ``bus/presence`` (automax_msgs/Presence every 20 ms, with
-manual liveliness). The processes find each other by these topics in the rack's namespace; the home, the process with
-common memory, sets the start when all are present. Messages of other runs are rejected and counted.
+manual liveliness). The processes find each other by these topics in the rack's namespace; the process with
+common memory sets the start when all are present. Messages of other runs are rejected and counted.
 
 ``begin`` is called when the start is known; before that nothing is written to the rack.
 """
@@ -101,7 +101,7 @@ class ProcessWatch:
 LEASE_NS = 100 * NS_PER_MS
 """Liveliness lease of a process's presence, for observers outside the rack."""
 ALONE_NS = 3500 * NS_PER_MS
-"""A home without a run begins one after seeing no other process for this long: discovery takes up to 3 s."""
+"""Common memory's process without a run begins one after seeing no other for this long: discovery takes up to 3 s."""
 LEAD_NS = 400 * NS_PER_MS
 """Time from the moment at which all processes are present to the start, so that all learn of it before."""
 ANSWER_NS = 100 * NS_PER_MS
@@ -127,13 +127,13 @@ class ProcessAlreadyRuns(UserError):
 class ProcessLayout:
     """How a rack is divided into processes.
 
-    ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the present one. ``is_common`` returns
+    ``processes`` are the slots of each, ``run_id`` the number of the run, 0 to join the present one. ``is_common`` is
     whether the current action happens in every process independently, as stimuli do. ``start_delay_ns`` is the time
-    from the moment at which all are present to the start; that of the home counts. ``awaits_recorder``: wait for a
-    recorder that has subscribed to this process.
+    from the moment at which all are present to the start; that of common memory's process counts.
+    ``awaits_recorder``: wait for a recorder that has subscribed to this process.
     """
 
-    seats: Sequence[tuple[int, ...]]
+    processes: Sequence[tuple[int, ...]]
     run_id: int = 0
     is_common: Callable[[], bool] = lambda: False
     start_delay_ns: int = LEAD_NS
@@ -143,29 +143,29 @@ class ProcessLayout:
 class DistributedMemory:
     """One process's connection to the bus. ``fault`` is the reason why the process cannot take part, else None.
 
-    ``seats`` are the slots of all processes by the slot that names each; ``plants`` are those of the plants' drives.
+    ``process_slots`` are the slots of each process by the slot that names it, ``plants`` those of the plants' drives.
     """
 
-    def __init__(self, site: RackContext, nodes: Sequence[ModuleNode], seating: ProcessLayout) -> None:
+    def __init__(self, rack_context: RackContext, nodes: Sequence[ModuleNode], process_layout: ProcessLayout) -> None:
         """Join the bus by the first of the process's nodes.
 
         Raises:
-            ValueError: the rack's part is not one of the seats.
+            ValueError: the rack's part is not one of the processes.
         """
-        rack, seats = site.rack, seating.seats
-        own = next((slots for slots in seats if set(slots) == rack.part.slots), None)
+        rack, processes = rack_context.rack, process_layout.processes
+        own = next((slots for slots in processes if set(slots) == rack.part.slots), None)
         if own is None:
             raise ValueError(f"slots {sorted(rack.part.slots)} are not a process of rack {rack.config.name}")
         node = nodes[0]
-        self._site, self._rack, self._node = site, rack, node
-        self.seats = {min(slots): tuple(slots) for slots in seats}
-        self._limits = BusLimits(self.seats)
+        self._rack_context, self._rack, self._node = rack_context, rack, node
+        self.process_slots = {min(slots): tuple(slots) for slots in processes}
+        self._limits = BusLimits(self.process_slots)
         self.plants = {item.name: item.slot for item in driven_plants(rack.config)}
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
-        self._watch, self._lead_ns = ProcessWatch(), seating.start_delay_ns
-        self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
-        self.link = ImageSync(rack, min(own), self._send, seating.is_common, self._guarded)
-        self._recorder = RecorderWait(site, nodes, PRESENCE) if seating.awaits_recorder else None
+        self._watch, self._lead_ns = ProcessWatch(), process_layout.start_delay_ns
+        self.peers = Peers(process, min(own), own, rack.installed, process_layout.run_id, lives=self._watch.lives)
+        self.link = ImageSync(rack, min(own), self._send, process_layout.is_common, self._guarded)
+        self._recorder = RecorderWait(rack_context, nodes, PRESENCE) if process_layout.awaits_recorder else None
         self.stage, self.joining = Stage.JOINING, False
         self.fault: ProcessAlreadyRuns | None = None
         self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
@@ -199,14 +199,17 @@ class DistributedMemory:
     @property
     def missing(self) -> list[str]:
         """The absent processes, by their first modules; if all are present, the recorder that is awaited."""
-        there = {*self.peers.by_seat, self.peers.seat}
-        found = [part_name(self._rack.config, slots) for seat, slots in self.seats.items() if seat not in there]
+        there = {*self.peers.by_slot, self.peers.process_slot}
+        found = [part_name(self._rack.config, slots) for slot, slots in self.process_slots.items() if slot not in there]
         return found or ([] if self._recorder is None else ["the recorder"])
 
     @property
     def lost(self) -> list[str]:
         """The processes that were lost and have not come back."""
-        return [part_name(self._rack.config, self.seats[seat]) for seat in sorted(self.peers.lost & set(self.seats))]
+        return [
+            part_name(self._rack.config, self.process_slots[slot])
+            for slot in sorted(self.peers.lost & set(self.process_slots))
+        ]
 
     def begin(self) -> None:
         """Apply the messages received before the start; call it as soon as the rack was started."""
@@ -243,7 +246,7 @@ class DistributedMemory:
             self._rack.config.name,
             peers.run_id,
             peers.process,
-            peers.seat,
+            peers.process_slot,
             tuple(sorted(peers.slots)),
             peers.fingerprint,
             int(self.stage),
@@ -281,11 +284,11 @@ class DistributedMemory:
         if (
             not peers.run_id
             and self._rack.part.holds_common_memory
-            and not peers.by_seat
+            and not peers.by_slot
             and now - self._since_ns > ALONE_NS
         ):
             peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
-        if not peers.run_id and self._rack.part.holds_common_memory and peers.by_seat and not any(peers.running()):
+        if not peers.run_id and self._rack.part.holds_common_memory and peers.by_slot and not any(peers.running()):
             peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
         if self._recorder is not None and self._recorder.is_over():
             self._recorder = None
@@ -297,7 +300,7 @@ class DistributedMemory:
                 self.joining, self.stage = True, Stage.RUNNING
         elif not self.missing and peers.run_id:
             self.stage = Stage.READY
-            others = [peer.stage == Stage.READY for peer in peers.by_seat.values()]
+            others = [peer.stage == Stage.READY for peer in peers.by_slot.values()]
             if self._rack.part.holds_common_memory and all(others):
                 peers.epoch_ns = time.time_ns() + self._lead_ns
                 self.stage = Stage.RUNNING
@@ -316,7 +319,7 @@ class DistributedMemory:
         self._participants.pop(peer.process, None)
         name = part_name(self._rack.config, peer.presence.slots)
         text = f"{name} is lost: its process ended or no longer responds"
-        self._site.health.note("lost process", (name, peer.process), lambda: text)
+        self._rack_context.health.note("lost process", (name, peer.process), lambda: text)
         self._node.get_logger().error(text)
         if self._begun:
             self._publish_image(self.link.last_of(peer.presence.seat), FOR_ALL)
@@ -339,7 +342,7 @@ class DistributedMemory:
             self._node.guard.report("the bus", error)
 
     def _refuse(self, topic: str, what: str) -> None:
-        self._site.health.note(
+        self._rack_context.health.note(
             "refused bus message", (topic, what[:40]), lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS
         )
 
@@ -410,15 +413,15 @@ class DistributedMemory:
 
         On a busy host they only wait here, and requesting an image each time would make it busier.
         """
-        with self._site.lock:
+        with self._rack_context.lock:
             is_short = self.peers.is_short(presence)
         if is_short and not all(self._write_topic.take() for _ in range(BATCHES_FIRST)):
-            with self._site.lock:
+            with self._rack_context.lock:
                 self.peers.missed(presence, time.monotonic_ns())
 
     def _report_stranger(self, found: PresenceVerdict, presence: Presence) -> None:
         name = part_name(self._rack.config, presence.slots)
-        if found is PresenceVerdict.SEAT_TAKEN and self.stage is Stage.JOINING and presence.state == Stage.RUNNING:
+        if found is PresenceVerdict.SLOT_TAKEN and self.stage is Stage.JOINING and presence.state == Stage.RUNNING:
             self.fault = ProcessAlreadyRuns(
                 f"{name} of this run is there already", "stop it first, or leave it as it is"
             )
@@ -426,9 +429,11 @@ class DistributedMemory:
         texts = {
             PresenceVerdict.OTHER_RUN: f"another rack is called {name_of_rack}: its {name} is not of this run",
             PresenceVerdict.OTHER_FILE: f"{name} has another rack file or other sources: it is not of this run",
-            PresenceVerdict.SEAT_TAKEN: f"a second process has {name}",
+            PresenceVerdict.SLOT_TAKEN: f"a second process has {name}",
         }
-        self._site.health.note("other rack", (found, presence.process), lambda: texts[found], most=FROM_STRANGERS)
+        self._rack_context.health.note(
+            "other rack", (found, presence.process), lambda: texts[found], most=FROM_STRANGERS
+        )
 
     def _when_begun(self, take: Callable[[], None]) -> None:
         if self._begun:

@@ -50,7 +50,7 @@ class BusTopic:
         self._receive, self._refuse = node.guarded_callback(topic, receive), refuse
         reader = TopicReader(subscription, terms.most_bytes, self._take)
         self.name, self.take = reader.name, reader.take
-        node.site.intake.add(reader, share=terms.share)
+        node.rack_context.intake.add(reader, share=terms.share)
 
     def _take(self, taken: RawMessage) -> None:
         if taken.payload is None:

@@ -46,9 +46,9 @@ def operate_name(module: str, service: str) -> str:
 
 @dataclass(frozen=True)
 class PartRequest:
-    """A request to one process: its seat, ``THIS_PROCESS`` for this one, and the request."""
+    """A request to one process: the slot that names it, ``THIS_PROCESS`` for this one, and the request."""
 
-    seat: int
+    process: int
     request: Any
 
 
@@ -61,13 +61,17 @@ class RequestForwarder:
     def __init__(self, node: ModuleNode, bus: DistributedMemory, reloaded: Callable[[], None]) -> None:
         """Find the process of each task, slot and plant."""
         self._reloaded = reloaded
-        config = node.site.rack.config
+        config = node.rack_context.rack.config
         self._node, self._bus, self._config = node, bus, config
-        home = bus.peers.seat
-        self._others = [seat for seat in bus.seats if seat != home]
-        seat_of = {slot: THIS_PROCESS if seat == home else seat for seat, slots in bus.seats.items() for slot in slots}
-        self._tasks = {task.name: seat_of[module.slot] for module, task in config.placed_tasks}
-        self._slots = {str(slot): seat for slot, seat in seat_of.items()}
+        own_slot = bus.peers.process_slot
+        self._others = [slot for slot in bus.process_slots if slot != own_slot]
+        process_of = {
+            slot: THIS_PROCESS if process == own_slot else process
+            for process, slots in bus.process_slots.items()
+            for slot in slots
+        }
+        self._tasks = {task.name: process_of[module.slot] for module, task in config.placed_tasks}
+        self._slots = {str(slot): process for slot, process in process_of.items()}
         self._plants = dict(bus.plants)
         self._clients: dict[tuple[int, str], Any] = {}
 
@@ -77,21 +81,23 @@ class RequestForwarder:
         if concerns is Concerns.NONE:
             return conclude(response, ok=False, reason=NOT_TOGETHER)
         parts = self._parts(concerns, request, kind)
-        if [part.seat for part in parts] == [THIS_PROCESS]:
+        if [part.process for part in parts] == [THIS_PROCESS]:
             return local(parts[0].request, response)
-        absent = [self._name(part.seat) for part in parts if part.seat not in (THIS_PROCESS, *self._bus.peers.by_seat)]
+        absent = [
+            self._name(part.process) for part in parts if part.process not in (THIS_PROCESS, *self._bus.peers.by_slot)
+        ]
         if absent and len(parts) == 1:
             return conclude(response, ok=False, reason=f"{absent[0]} is not there: start its process again")
-        answers: dict[int, Any] = {part.seat: None for part in parts}
+        answers: dict[int, Any] = {part.process: None for part in parts}
         for part in parts:
-            if part.seat == THIS_PROCESS:
+            if part.process == THIS_PROCESS:
                 answers[THIS_PROCESS] = local(part.request, kind.Response())
 
         def begin(respond: Respond) -> None:
             _PendingRequest(self, service, kind, parts, answers, lambda: respond(end()))
 
         def end() -> Any:
-            silent = [self._name(part.seat) for part in parts if answers[part.seat] is None]
+            silent = [self._name(part.process) for part in parts if answers[part.process] is None]
             found = _merged(response, request, parts, answers, silent)
             if service == "reload" and _is_ok(found):
                 self._note_source(request)
@@ -102,15 +108,15 @@ class RequestForwarder:
     def _note_source(self, request: Any) -> None:
         """Store the new source of a task of another process: recorders get the rack's files from this one."""
         name = request.task.strip().upper()
-        sources = self._node.site.rack.operations.installation.sources
+        sources = self._node.rack_context.rack.operations.installation.sources
         sources[name] = SourceText(sources[name].name, request.source)
         self._reloaded()
 
-    def client(self, seat: int, service: str, kind: Any) -> Any:
+    def client(self, process: int, service: str, kind: Any) -> Any:
         """Return the client of a service of another process."""
-        key = seat, service
+        key = process, service
         if key not in self._clients:
-            name = operate_name(self._name(seat), service)
+            name = operate_name(self._name(process), service)
             self._clients[key] = self._node.create_client(kind, name)
         return self._clients[key]
 
@@ -119,9 +125,9 @@ class RequestForwarder:
         """The node that sends the requests."""
         return self._node
 
-    def is_there(self, seat: int) -> bool:
+    def is_there(self, process: int) -> bool:
         """Return whether a process is present."""
-        return seat in self._bus.peers.by_seat
+        return process in self._bus.peers.by_slot
 
     def _parts(self, concerns: Concerns, request: Any, kind: Any) -> list[PartRequest]:
         """Return a request to each process that it concerns; this one refuses unknown names."""
@@ -129,24 +135,24 @@ class RequestForwarder:
             groups: dict[int, list[str]] = {}
             for name in request.names:
                 groups.setdefault(self._process_of_name(name), []).append(name)
-            return [PartRequest(seat, kind.Request(names=names)) for seat, names in groups.items()]
+            return [PartRequest(process, kind.Request(names=names)) for process, names in groups.items()]
         if (
             concerns in (Concerns.ALL, Concerns.NAMES)
             or (concerns is Concerns.TASK and not request.task.strip())
             or (concerns is Concerns.STATUS and not request.home_only)
         ):
-            return [PartRequest(THIS_PROCESS, request), *(PartRequest(seat, request) for seat in self._others)]
+            return [PartRequest(THIS_PROCESS, request), *(PartRequest(process, request) for process in self._others)]
         if concerns is Concerns.TASK:
-            seat = self._process_of_task(request.task)
+            process = self._process_of_task(request.task)
         elif concerns is Concerns.NAME:
-            seat = self._process_of_name(request.name)
+            process = self._process_of_name(request.name)
         elif concerns is Concerns.SLOT:
-            seat = self._slots.get(request.name.strip(), THIS_PROCESS)
+            process = self._slots.get(request.name.strip(), THIS_PROCESS)
         elif concerns is Concerns.PLANT:
-            seat = self._slots.get(str(self._plants.get(request.name.strip().upper(), "")), THIS_PROCESS)
+            process = self._slots.get(str(self._plants.get(request.name.strip().upper(), "")), THIS_PROCESS)
         else:
-            seat = THIS_PROCESS
-        return [PartRequest(seat, request)]
+            process = THIS_PROCESS
+        return [PartRequest(process, request)]
 
     def _process_of_task(self, text: str) -> int:
         return self._tasks.get(text.strip().upper(), THIS_PROCESS)
@@ -156,8 +162,12 @@ class RequestForwarder:
         task, point, _ = text.partition(".")
         return self._process_of_task(task) if point else THIS_PROCESS
 
-    def _name(self, seat: int) -> str:
-        return part_name(self._config, self._bus.seats[seat]) if seat in self._bus.seats else quoted(str(seat))
+    def _name(self, process: int) -> str:
+        return (
+            part_name(self._config, self._bus.process_slots[process])
+            if process in self._bus.process_slots
+            else quoted(str(process))
+        )
 
 
 class _PendingRequest:
@@ -176,9 +186,9 @@ class _PendingRequest:
         done: Callable[[], None],
     ) -> None:
         self._answers, self._done, self._node = answers, done, forwarding.node
-        called = [part for part in parts if part.seat != THIS_PROCESS and forwarding.is_there(part.seat)]
-        self._open = {part.seat for part in called}
-        self._not_called = [(part, forwarding.client(part.seat, service, kind)) for part in called]
+        called = [part for part in parts if part.process != THIS_PROCESS and forwarding.is_there(part.process)]
+        self._open = {part.process for part in called}
+        self._not_called = [(part, forwarding.client(part.process, service, kind)) for part in called]
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         wait_s = RELOAD_ANSWER_S if service == "reload" else ANSWER_S
         self._timers = [
@@ -196,15 +206,15 @@ class _PendingRequest:
         for part, client in waiting:
             if client.service_is_ready():
                 future = client.call_async(part.request)
-                future.add_done_callback(lambda found, seat=part.seat: self._answered(seat, found))
+                future.add_done_callback(lambda found, process=part.process: self._answered(process, found))
             else:
                 self._not_called.append((part, client))
 
-    def _answered(self, seat: int, future: Any) -> None:
-        with self._node.site.between_scans():
-            if seat in self._open:
-                self._open.discard(seat)
-                self._answers[seat] = future.result()
+    def _answered(self, process: int, future: Any) -> None:
+        with self._node.rack_context.between_scans():
+            if process in self._open:
+                self._open.discard(process)
+                self._answers[process] = future.result()
                 if not self._open:
                     self._end()
 

@@ -29,8 +29,8 @@ _MOST_BYTES = 1 << 16
 class PresencePublisher:
     """Publishes the presence of a rack that is whole in this process."""
 
-    def __init__(self, site: RackContext, node: ModuleNode) -> None:
-        self._site, self._process = site, int.from_bytes(os.urandom(8), "big") >> 1 or 1
+    def __init__(self, rack_context: RackContext, node: ModuleNode) -> None:
+        self._rack_context, self._process = rack_context, int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._publisher = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
         kind, terms = "automax_msgs/msg/Presence", Terms(_MOST_BYTES)
         BusTopic(node, PRESENCE, kind, QoSProfile(depth=10), self._receive, self._refuse, terms)
@@ -38,7 +38,7 @@ class PresencePublisher:
         node.create_timer(PERIOD_NS / NS_PER_S, node.guarded_callback(PRESENCE, self._publish), clock=steady)
 
     def _publish(self) -> None:
-        rack, run_id = self._site.rack, self._site.stream.run_id
+        rack, run_id = self._rack_context.rack, self._rack_context.stream.run_id
         slots = tuple(sorted(rack.part.slots))
         presence = Presence(
             time.time_ns(), rack.config.name, run_id, self._process, slots[0], slots, rack.installed, int(Stage.RUNNING)
@@ -47,9 +47,9 @@ class PresencePublisher:
 
     def _receive(self, presence: Presence, _: bytes) -> None:
         if presence.process != self._process:
-            name = self._site.rack.config.name
+            name = self._rack_context.rack.config.name
             text = f"another rack is named {name}: their messages cannot be distinguished"
-            self._site.health.note("other rack", presence.run_id, lambda: text, most=FROM_STRANGERS)
+            self._rack_context.health.note("other rack", presence.run_id, lambda: text, most=FROM_STRANGERS)
 
     def _refuse(self, topic: str, what: str) -> None:
-        self._site.health.note("refused message", topic, lambda: f"{topic}: {what} was refused")
+        self._rack_context.health.note("refused message", topic, lambda: f"{topic}: {what} was refused")

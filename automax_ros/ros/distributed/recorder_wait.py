@@ -33,11 +33,11 @@ class RecorderWait:
     These are the topics that the stream of this process publishes, by ``nodes``, and ``others``, topics of the rack.
     """
 
-    def __init__(self, site: RackContext, nodes: Sequence[ModuleNode], *others: str) -> None:
+    def __init__(self, rack_context: RackContext, nodes: Sequence[ModuleNode], *others: str) -> None:
         self._nodes = nodes
-        self._space, self._name = f"/{site.rack.config.namespace}", recorder_name(site.arguments)
-        recorded = LiveTopics.expected(self._space, site.rack.config).all
-        sent = [topic.name for topic in site.stream.topics if topic.name in recorded]
+        self._space, self._name = f"/{rack_context.rack.config.namespace}", recorder_name(rack_context.arguments)
+        recorded = LiveTopics.expected(self._space, rack_context.rack.config).all
+        sent = [topic.name for topic in rack_context.stream.topics if topic.name in recorded]
         self._unread = [*dict.fromkeys(sent), *(f"{self._space}/{topic}" for topic in others)]
         self._next_ns = 0
 

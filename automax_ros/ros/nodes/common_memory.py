@@ -43,7 +43,7 @@ def subscribe_joint(node: ModuleNode, command: JointCommand) -> None:
     A command writes the common that the rack file names, between two scans, as the writer ``ros``. The last command
     stays in force when a controller disappears (decision: so do forward_command_controller and every other ``/set``).
     """
-    config, interface = node.site.rack.config, command.interface
+    config, interface = node.rack_context.rack.config, command.interface
     view = next(view for view, variable in enumerate(config.variables) if variable.name == command.common)
     topic = f"/{config.namespace}/{command_topic(command.joint, interface)}"
     scaled = None
@@ -68,9 +68,9 @@ _LAYOUT_BYTES = 1024
 class CommonMemoryNode(ModuleNode):
     """Serves the topics of common memory; its callbacks run between scans."""
 
-    def __init__(self, site: RackContext) -> None:
-        super().__init__(site, "common_memory")
-        rack, stream = site.rack, site.stream
+    def __init__(self, rack_context: RackContext) -> None:
+        super().__init__(rack_context, "common_memory")
+        rack, stream = rack_context.rack, rack_context.stream
         outlets: dict[Topic, Take] = {}
         for own in stream.topics:
             if own.slot is None:
@@ -88,7 +88,7 @@ class CommonMemoryNode(ModuleNode):
         for command in rack.config.joint_commands:
             subscribe_joint(self, command)
         stream.add_sink(outlets.get)
-        self.diagnose(RackHealth(site, f"{MAIN_NODE}: {rack.config.name}").statuses)
+        self.diagnose(RackHealth(rack_context, f"{MAIN_NODE}: {rack.config.name}").statuses)
         self.diagnose(self._module_health)
 
     def _send_operation(self, publish: Take, stamp: int, payload: bytes) -> None:
@@ -98,7 +98,7 @@ class CommonMemoryNode(ModuleNode):
 
     def _module_health(self, _: int) -> list[DiagnosticStatus]:
         """Return the health of the module that holds common memory; a lone Processor reports its own."""
-        rack = self.site.rack
+        rack = self.rack_context.rack
         module = next(item for item in rack.config.modules if item.slot == rack.config.common_memory_slot)
         if module.tick_ns:
             return []
@@ -109,7 +109,7 @@ class CommonMemoryNode(ModuleNode):
 
     def offer_files(self) -> None:
         """Publish the rack's files again if one of them has changed."""
-        rack = self.site.rack
+        rack = self.rack_context.rack
         files = files_of(rack)
         if files != self._files:
             self._files = files

@@ -27,15 +27,17 @@ from automax_ros.ros.base.write_topic import WriteTopic
 class DrivePlantNode(ModuleNode):
     """Serves the plant of one drive."""
 
-    def __init__(self, site: RackContext, driven: DrivenPlant) -> None:
-        super().__init__(site, "_".join(filter(None, ("drive_plant", str(driven.slot), driven.drive))))
-        self._driven, self._plant = driven, site.rack.plants[driven.name]
-        outlets = {topic: self.outlet(topic) for topic in site.stream.plants.topics if topic.plant == driven.name}
-        site.stream.add_sink(outlets.get)
-        modules = {module.config.slot: module for module in site.rack.modules}
+    def __init__(self, rack_context: RackContext, driven: DrivenPlant) -> None:
+        super().__init__(rack_context, "_".join(filter(None, ("drive_plant", str(driven.slot), driven.drive))))
+        self._driven, self._plant = driven, rack_context.rack.plants[driven.name]
+        outlets = {
+            topic: self.outlet(topic) for topic in rack_context.stream.plants.topics if topic.plant == driven.name
+        }
+        rack_context.stream.add_sink(outlets.get)
+        modules = {module.config.slot: module for module in rack_context.rack.modules}
         module = modules[driven.slot]
         self._timing = module.timing if isinstance(module, DriveControllerModule) else None
-        self._controls = SwitchOperations(site.rack)
+        self._controls = SwitchOperations(rack_context.rack)
         if driven.config.load.from_ros:
             target = f"the load of {driven.name}"
             WriteTopic(self, load_topic(driven.name), "std_msgs/msg/Float64", self._load, 8, target)
@@ -46,7 +48,7 @@ class DrivePlantNode(ModuleNode):
 
     def _health(self, _: int) -> list[DiagnosticStatus]:
         """Return the plant's health: WARN with a fault, or with late firings since the last report; else OK."""
-        state = self.site.stream.plants.last(self._driven.name)
+        state = self.rack_context.stream.plants.last(self._driven.name)
         if state is None:
             return []
         level, text = DiagnosticStatus.OK, "turns" if state.speed_rpm else "stands still"
@@ -60,7 +62,7 @@ class DrivePlantNode(ModuleNode):
         }
         timing = self._timing
         if timing is not None:
-            newly = self.site.diagnostics.newly(f"{self._driven.name} late", timing.late)
+            newly = self.rack_context.diagnostics.newly(f"{self._driven.name} late", timing.late)
             shown |= {
                 "interrupts": str(timing.interrupts),
                 "late": str(timing.late),

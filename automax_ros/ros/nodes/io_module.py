@@ -15,10 +15,10 @@ from automax_ros.ros.base.node import ModuleNode, RackContext
 class IoModuleNode(ModuleNode):
     """Serves one I/O module."""
 
-    def __init__(self, site: RackContext, module: Module) -> None:
-        super().__init__(site, module.config.name)
+    def __init__(self, rack_context: RackContext, module: Module) -> None:
+        super().__init__(rack_context, module.config.name)
         self._module = module.config
-        self._bank = site.rack.backplane.bank(module.config.slot)
+        self._bank = rack_context.rack.backplane.bank(module.config.slot)
         registers = module.config.registers
         self._shown = [number for number in range(registers.count) if number not in registers.reserved]
         self.diagnose(self._health)
@@ -27,6 +27,6 @@ class IoModuleNode(ModuleNode):
         values = {}
         if self._bank is not None:
             for register in self._shown:
-                word = self.site.rack.memory.read_now(self._bank.view, register)
+                word = self.rack_context.rack.memory.read_now(self._bank.view, register)
                 values[f"register_{register}"] = f"{int(word) & 0xFFFF:04X}H"
         return [self.status(self._module.model, DiagnosticStatus.OK, "running", self._module.slot, values)]

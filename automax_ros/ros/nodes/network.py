@@ -43,25 +43,27 @@ MOST_BYTES = len(encode(NetworkDrop(0, 0, "R" * 8, 0, 0, 0, False, 0, 0, (0,) * 
 class NetworkNode(ModuleNode):
     """Serves one network module."""
 
-    def __init__(self, site: RackContext, module: Module) -> None:
-        super().__init__(site, module.config.name)
+    def __init__(self, rack_context: RackContext, module: Module) -> None:
+        super().__init__(rack_context, module.config.name)
         assert isinstance(module, NetworkModule)
         self._module, self._slot, self._model = module, module.config.slot, module.config.model
-        name = network_topic(site.rack.config.namespace, module.network)
+        name = network_topic(rack_context.rack.config.namespace, module.network)
         self._waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
         self._logged: tuple[object, ...] = ("", (), ())
         self._throttle = Throttle(LOG_INTERVAL_S)
         self._publish = self.outlet(Topic(name, TYPE, NETWORK, self._slot))
         subscription = self.own_subscription(message_class(TYPE), name, ros_qos(NETWORK))
         # Messages wait for the next cycle; b"" replaces one that is too long.
-        site.intake.add(TopicReader(subscription, MOST_BYTES, lambda taken: self._waiting.append(taken.payload or b"")))
+        rack_context.intake.add(
+            TopicReader(subscription, MOST_BYTES, lambda taken: self._waiting.append(taken.payload or b""))
+        )
         module.connect(self._send)
-        scheduler, key = site.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
+        scheduler, key = rack_context.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
         scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._check())
         self.diagnose(self._health)
 
     def _send(self, now_ns: int, frames: Sequence[DropMessage]) -> None:
-        stream, rack = self.site.stream, self.site.rack.config.name
+        stream, rack = self.rack_context.stream, self.rack_context.rack.config.name
         stamp = stream.stamp(now_ns)
         for item in frames:
             message = NetworkDrop(
@@ -82,7 +84,7 @@ class NetworkNode(ModuleNode):
         waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
         if waiting:
             arrived = [_read(payload) for payload in waiting]
-            own = (self.site.stream.run_id, self._slot)
+            own = (self.rack_context.stream.run_id, self._slot)
             known = [item for item in arrived if item is not None and (item[0].run_id, item[0].slot) != own]
             self._module.receive(known, damaged=arrived.count(None))
         status = self._module.status()
@@ -90,14 +92,14 @@ class NetworkNode(ModuleNode):
         if shown != self._logged and self._throttle.passes():
             self._logged = shown
             self._log_status(status)
-            self.site.diagnostics.look()
+            self.rack_context.diagnostics.look()
 
     def _log_status(self, status: NetworkStatus) -> None:
         network, log = self._module.network, self.get_logger()
         if status.rivals:
             who = ", ".join(map(str, status.rivals))
             text = f"network {network}: drops of another module are used by {who}: give each module drops of its own"
-            self.site.health.note("two modules with one drop", network, lambda: text)
+            self.rack_context.health.note("two modules with one drop", network, lambda: text)
             log.error(text)
         if status.lost:
             log.warning(f"network {network}: {_sentence(status)}")

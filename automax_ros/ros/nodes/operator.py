@@ -37,13 +37,13 @@ class Reloading:
     """
 
     def __init__(self, node: ModuleNode, reloads: Reloads, conclude: Conclude) -> None:
-        self._site, self._reloads, self._conclude = node.site, reloads, conclude
+        self._rack_context, self._reloads, self._conclude = node.rack_context, reloads, conclude
         self._work = Background(node)
         self._reloading = ""
 
     def answer(self, request: Any, response: Any) -> Any:
         """Answer a request: at once if it is refused, else when its source is compiled."""
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             try:
                 self._refuse_second(request.task)
                 name, source = self._reloads.admit(request.task, request.source)
@@ -57,7 +57,7 @@ class Reloading:
             )
 
         def finish(prepared: PreparedReload, error: Exception | None, respond: Respond) -> None:
-            with self._site.between_scans():
+            with self._rack_context.between_scans():
                 try:
                     if error is not None:
                         raise error
@@ -95,9 +95,9 @@ class OperatorServices:
 
     def __init__(self, node: ModuleNode, name_of: Callable[[str], str] = str) -> None:
         """Create the services; ``name_of`` returns the full name of one."""
-        self._node, self._site = node, node.site
+        self._node, self._rack_context = node, node.rack_context
         self.forward_by: RequestForwarder | None = None
-        self._requests = OperatorRequests(self._site.rack, self._site.pacer)
+        self._requests = OperatorRequests(self._rack_context.rack, self._rack_context.pacer)
         self._begun_ns = time.monotonic_ns()
         self._reloading = Reloading(node, self._requests.reloads, partial(self._concluded, "reload"))
         self._answers: dict[str, Callable[[Any, Any], Any]] = {}
@@ -128,12 +128,12 @@ class OperatorServices:
         """Return a response, or ``DeferredResponse`` if other processes must answer first."""
         if self.forward_by is None:
             return self._answers[name](request, response)
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             return self.forward_by.answer(name, kind, request, response, self._answers[name])
 
     def _answered(self, name: str, request: Any, response: Any) -> Any:
         """Execute a request in this process, and return its response."""
-        with self._site.between_scans():
+        with self._rack_context.between_scans():
             error: Exception | None = None
             try:
                 fields = VERBS[name].act(self._requests, **_fields_of(request))
@@ -156,7 +156,7 @@ class OperatorServices:
 
     def _of_the_graph(self, name: str) -> Fields:
         """Return the fields of an answer that the rack itself does not know."""
-        rack, stream = self._site.rack, self._site.stream
+        rack, stream = self._rack_context.rack, self._rack_context.stream
         if name == "status":
             return {"run_id": stream.run_id, "racks": self._racks()}
         if name == "tasks":
@@ -187,8 +187,8 @@ def _fill(response: Any, fields: Fields) -> None:
 class OperatorNode(ModuleNode):
     """Serves the operator of one rack."""
 
-    def __init__(self, site: RackContext) -> None:
-        super().__init__(site, "operator")
+    def __init__(self, rack_context: RackContext) -> None:
+        super().__init__(rack_context, "operator")
         self.operator_services = OperatorServices(self)
 
     def destroy_node(self) -> None:

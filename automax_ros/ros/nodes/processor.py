@@ -44,9 +44,9 @@ _SHOWN = {"iscr": ISCR, "scans_per_interrupt": SCANS_PER_INTERRUPT, "scans_since
 class ProcessorNode(ManagedModuleNode):
     """Node of one Processor; the scheduler of the rack scans its tasks."""
 
-    def __init__(self, site: RackContext, processor: Module) -> None:
-        super().__init__(site, processor)
-        rack, stream = site.rack, site.stream
+    def __init__(self, rack_context: RackContext, processor: Module) -> None:
+        super().__init__(rack_context, processor)
+        rack, stream = rack_context.rack, rack_context.stream
         self._rack, self._module = rack, processor.config
         self._slot, self._tasks = processor.config.slot, [item.task for item in processor.tasks]
         outlets = {
@@ -54,7 +54,7 @@ class ProcessorNode(ManagedModuleNode):
             for topic in stream.module_topics
             if topic.slot == self._slot
         }
-        self.tunables = TunableParameters(self, rack, site.between_scans)
+        self.tunables = TunableParameters(self, rack, rack_context.between_scans)
         self.tunables.declare(self._tasks)
         self._stop_throttle = Throttle(ERROR_INTERVAL_S)
         self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in self._tasks}
@@ -77,7 +77,7 @@ class ProcessorNode(ManagedModuleNode):
         told = self._error_throttles[task.name].passes()
         for number, (line, code) in enumerate(record.errors):
             describe = partial(_described, task, LogEntry(line, code, record.scan))
-            self.site.health.note("run-time error", (task.name, line, code), describe)
+            self.rack_context.health.note("run-time error", (task.name, line, code), describe)
             if told and number < ERRORS_SHOWN:
                 self.get_logger().warning(describe())
 
@@ -127,7 +127,7 @@ class ProcessorNode(ManagedModuleNode):
         A BASIC task that has reached its END has done its work: OK (decision).
         """
         statistics = self._rack.statistics[task.name]
-        newly_skipped = self.site.diagnostics.newly(task.name, statistics.skipped)
+        newly_skipped = self.rack_context.diagnostics.newly(task.name, statistics.skipped)
         cause = self._rack.operations.stopped
         level, text = DiagnosticStatus.OK, task.status.value
         if task.status is Status.FAULTED:
@@ -166,13 +166,13 @@ def _described(task: Task, entry: LogEntry) -> str:
 class UdcNode(ProcessorNode):
     """Node of one UDC."""
 
-    def __init__(self, site: RackContext, udc: Module) -> None:
+    def __init__(self, rack_context: RackContext, udc: Module) -> None:
         self._udc = udc
-        super().__init__(site, udc)
+        super().__init__(rack_context, udc)
 
     def _module_status(self, tasks: list[DiagnosticStatus]) -> DiagnosticStatus:
         """Return the health of the module itself: also WARN while its tasks wait for the common clock."""
-        config, rack = self._udc.config, self.site.rack
+        config, rack = self._udc.config, self.rack_context.rack
         bank = rack.backplane.bank(config.slot)
         assert bank is not None
         status = super()._module_status(tasks)

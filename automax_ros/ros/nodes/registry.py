@@ -77,25 +77,25 @@ def module_facts(module: ModuleConfig) -> Facts:
     return facts
 
 
-def nodes_of(site: RackContext) -> tuple[ModuleNode, ...]:
+def nodes_of(rack_context: RackContext) -> tuple[ModuleNode, ...]:
     """Create the nodes of a rack's part: those of its modules by slot.
 
     If the part has common memory, its node and, if the rack has one, the operator's come first. Those of the plants
     that drives turn come last, by slot and drive.
     """
     made: list[ModuleNode] = []
-    if site.holds_common_memory:
-        made.append(CommonMemoryNode(site))
-        made[0].declare_facts(rack_facts(site.rack))
-        if site.rack.config.operator:
-            made.append(OperatorNode(site))
-    for module in site.rack.modules:
+    if rack_context.holds_common_memory:
+        made.append(CommonMemoryNode(rack_context))
+        made[0].declare_facts(rack_facts(rack_context.rack))
+        if rack_context.rack.config.operator:
+            made.append(OperatorNode(rack_context))
+    for module in rack_context.rack.modules:
         node = NODES[SUPPORTED[module.config.model]]
         if node is not None:
-            made.append(node(site, module))
+            made.append(node(rack_context, module))
             made[-1].declare_facts(module_facts(module.config))
-    made += (DrivePlantNode(site, driven) for driven in site.rack.part.driven)
-    if not site.holds_common_memory:
-        made[0].diagnose(RackHealth(site, f"{made[0].get_name()}: process").statuses)
+    made += (DrivePlantNode(rack_context, driven) for driven in rack_context.rack.part.driven)
+    if not rack_context.holds_common_memory:
+        made[0].diagnose(RackHealth(rack_context, f"{made[0].get_name()}: process").statuses)
     StatusTables(made[0])
     return tuple(made)

@@ -1,12 +1,12 @@
 """The tables of a live rack on topics: ``tasks`` and ``forces`` (latched, on change), ``statistics`` (each second).
 
-The home, the process with common memory, publishes forces and the tasks of the whole rack; each process publishes the
+The process with common memory publishes forces and the tasks of the whole rack; each process publishes the
 statistics of its own modules. A table is checked once per second of rack time, and soon after each operation, ten
 times per second at most (decision).
 
-Each other process publishes the tasks of its own modules on ``tasks/parts``, each second and when they change; the home
-joins them by module (``JoinedTasks``). A module without a part for ``SILENT_NS`` is not in the table (decision): the
-state of its tasks is unknown.
+Each other process publishes the tasks of its own modules on ``tasks/parts``, each second and when they change; common
+memory's process joins them by module (``JoinedTasks``). A module without a part for ``SILENT_NS`` is not in the table
+(decision): the state of its tasks is unknown.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey
 PARTS = "tasks/parts"
 """The topic of the parts, in the rack's namespace."""
 PART = QosProfile("reliable", "transient_local", "keep_last", 32)
-"""Latched, so that the home receives the last parts of all processes."""
+"""Latched, so that the process with common memory receives the last parts of all processes."""
 SILENT_NS = 3 * NS_PER_S
 MOST_BYTES = 1 << 20
 """Longest part that is read."""
@@ -61,8 +61,8 @@ class JoinedTasks:
     """Receives the parts; ``changed`` is called after each. For the process with common memory."""
 
     def __init__(self, node: ModuleNode, changed: Callable[[], None]) -> None:
-        self._site, self._changed = node.site, changed
-        rack = node.site.rack
+        self._rack_context, self._changed = node.rack_context, changed
+        rack = node.rack_context.rack
         self._tasks = {
             (module.name, module.slot): {task.name for task in module.tasks}
             for module in rack.config.modules
@@ -76,7 +76,7 @@ class JoinedTasks:
         return [item for at_ns, items in self._parts.values() if now_ns - at_ns <= SILENT_NS for item in items]
 
     def _take(self, table: RemoteTable, _: bytes) -> None:
-        if table.run_id != self._site.stream.run_id:
+        if table.run_id != self._rack_context.stream.run_id:
             return  # latched by the run before; other racks are reported by the bus
         modules: dict[str, list[RemoteTask]] = {}
         for item in table.tasks:
@@ -84,19 +84,21 @@ class JoinedTasks:
                 self._refuse(PARTS, "a task that is not another process's")
                 return
             modules.setdefault(item.module, []).append(item)
-        now_ns = self._site.rack.now_ns
+        now_ns = self._rack_context.rack.now_ns
         self._parts |= {module: (now_ns, items) for module, items in modules.items()}
         self._changed()
 
     def _refuse(self, topic: str, what: str) -> None:
-        self._site.health.note("refused table", what[:40], lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS)
+        self._rack_context.health.note(
+            "refused table", what[:40], lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS
+        )
 
 
 class StatusTables:
     """Publishes the tables of this process, by the publishers of one node."""
 
     def __init__(self, node: ModuleNode) -> None:
-        self._rack, self._stream, self._pace = node.site.rack, node.site.stream, node.site.pacer
+        self._rack, self._stream, self._pace = node.rack_context.rack, node.rack_context.stream, node.rack_context.pacer
         part = self._rack.part
         self._tasks = node.create_publisher(TaskTable, "tasks" if part.holds_common_memory else PARTS, ros_qos(LATCHED))
         self._joined = JoinedTasks(node, self._check_soon) if part.holds_common_memory and not part.is_whole else None
@@ -159,7 +161,7 @@ class StatusTables:
 
     def _report(self, now_ns: int) -> None:
         if not self._rack.part.holds_common_memory:
-            self._sent.clear()  # publish each second, so that the home knows that this process lives
+            self._sent.clear()  # publish each second, so that common memory's process knows that this process lives
         self.look(now_ns)
         passed_ns, self._reported_ns = now_ns - self._reported_ns, now_ns
         tasks = [statistics_of(module, item, passed_ns) for module in self._rack.task_modules for item in module.tasks]

@@ -91,25 +91,28 @@ def enclave_of_rack(config: RackConfig, arguments: RosArguments = NO_ARGUMENTS) 
     return Enclave(f"/{config.namespace}/rack", _profiles(Rack(config), arguments))
 
 
-def enclaves_of_seats(
-    config: RackConfig, seats: Sequence[RackProcess], arguments: RosArguments = NO_ARGUMENTS
+def enclaves_of_processes(
+    config: RackConfig, processes: Sequence[RackProcess], arguments: RosArguments = NO_ARGUMENTS
 ) -> tuple[Enclave, ...]:
     """Return the enclaves of the processes of a distributed rack.
 
     Raises:
         RackError, RosUnavailable: as above.
     """
-    seating = ProcessLayout([seat.slots for seat in seats], _ANY_RUN)
+    process_layout = ProcessLayout([process.slots for process in processes], _ANY_RUN)
     return tuple(
-        Enclave(f"/{config.namespace}/{seat.name}", _profiles(Rack(config, local=seat.slots), arguments, seating))
-        for seat in seats
+        Enclave(
+            f"/{config.namespace}/{process.name}",
+            _profiles(Rack(config, local=process.slots), arguments, process_layout),
+        )
+        for process in processes
     )
 
 
-def _profiles(rack: Rack, arguments: RosArguments, seating: ProcessLayout | None = None) -> tuple[Profile, ...]:
+def _profiles(rack: Rack, arguments: RosArguments, process_layout: ProcessLayout | None = None) -> tuple[Profile, ...]:
     context = joined_context(arguments)
     try:
-        with RackNodes(rack, context=context, arguments=arguments, seating=seating) as made:
+        with RackNodes(rack, context=context, arguments=arguments, process_layout=process_layout) as made:
             managers = [] if made.manager is None else [made.manager]
             return tuple(_profile(node) for node in (*managers, *made.nodes))
     finally:

@@ -1,4 +1,4 @@
-"""Locks for one rack of a name, or one process of each seat, in a ROS domain of a host; they end with the process."""
+"""Locks for one rack of a name, or one process for each part of it, in a ROS domain of a host."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class LockError(UserError):
 
 
 class RackAlreadyRuns(LockError):
-    """Another process of this host runs the rack, or this seat of it, in the same ROS domain."""
+    """Another process of this host runs the rack, or this part of it, in the same ROS domain."""
 
 
 def domain_id() -> int:
@@ -40,12 +40,12 @@ def domain_id() -> int:
 class InstanceLock:
     """Holds the lock while the ``with`` block lasts; the kernel frees it when the process ends, however it ends.
 
-    A process with the whole rack locks the rack exclusively. One with a ``seat`` of a distributed rack shares the lock
-    of the rack with those of other seats, and locks its seat exclusively.
+    A process with the whole rack locks the rack exclusively. One ``process`` of a distributed rack shares the lock
+    of the rack with the others, and locks its own name exclusively.
     """
 
-    def __init__(self, namespace: str, domain: int, seat: str | None = None) -> None:
-        self._rack, self._seat = f"rack /{namespace} in ROS domain {domain}", seat
+    def __init__(self, namespace: str, domain: int, process: str | None = None) -> None:
+        self._rack, self._process = f"rack /{namespace} in ROS domain {domain}", process
         name = f"automax_ros_{os.getuid()}_{domain}_{namespace.replace('/', '.')}"
         self._path = Path(tempfile.gettempdir()) / f"{name}.lock"
         self._files: list[tuple[int, Path]] = []
@@ -58,12 +58,12 @@ class InstanceLock:
             LockError: its file cannot be opened.
         """
         try:
-            if self._seat is None:
+            if self._process is None:
                 self._take(self._path, self._rack, fcntl.LOCK_EX)
             else:
                 self._take(self._path, self._rack, fcntl.LOCK_SH)
                 self._take(
-                    self._path.with_suffix(f".{self._seat}.lock"), f"{self._seat} of {self._rack}", fcntl.LOCK_EX
+                    self._path.with_suffix(f".{self._process}.lock"), f"{self._process} of {self._rack}", fcntl.LOCK_EX
                 )
         except LockError:
             self._free()

@@ -70,8 +70,8 @@ def test_what_does_not_fit_together_is_not_a_message():
     assert image_of(BusImage(1, 2, 3, 4, 5), TEXTS) == ImageCopy(4, (), ())
 
 
-def said(process=5, seat=2, *, run_id=42, state=Stage.RUNNING, fingerprint=1, sequence=0) -> Presence:
-    return Presence(0, "PM1", run_id, process, seat, (seat,), fingerprint, int(state), 0, sequence)
+def said(process=5, slot=2, *, run_id=42, state=Stage.RUNNING, fingerprint=1, sequence=0) -> Presence:
+    return Presence(0, "PM1", run_id, process, slot, (slot,), fingerprint, int(state), 0, sequence)
 
 
 def known(**lives) -> Peers:
@@ -86,7 +86,7 @@ def test_what_a_process_says_tells_whether_it_belongs_to_the_run():
     assert peers.heard(said(6), 2) is PresenceVerdict.NEW
     assert peers.heard(said(9, 3, run_id=43), 2) is PresenceVerdict.OTHER_RUN
     assert peers.heard(said(9, 3, fingerprint=2), 2) is PresenceVerdict.OTHER_FILE
-    assert peers.heard(said(9, 5), 2) is PresenceVerdict.SEAT_TAKEN
+    assert peers.heard(said(9, 5), 2) is PresenceVerdict.SLOT_TAKEN
     assert [peer.process for peer in peers.running()] == [6]
     assert peers.of(6) is not None
     assert peers.of(9) is None
@@ -127,7 +127,7 @@ def test_one_that_leaves_in_order_is_not_lost():
     peers = known(lives=lambda _: False)
     peers.heard(said(state=Stage.LEAVING), 0)
     assert peers.look(BEAT) == []
-    assert peers.by_seat == {}
+    assert peers.by_slot == {}
     assert peers.lost == set()
 
 

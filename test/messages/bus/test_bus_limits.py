@@ -1,4 +1,4 @@
-"""What of a message between processes is refused: forged seats, slots, times and numbers."""
+"""What of a message between processes is refused: forged processes, slots, times and numbers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Values
 from automax_ros.rack.distributed.image_sync import StopState
 
-SEATS = {1: (1, 7), 3: (3,)}
+PROCESS_SLOTS = {1: (1, 7), 3: (3,)}
 WALL_NS = 1_800_000_000 * NS_PER_S
 LATEST_NS = 3600 * NS_PER_S + AHEAD_NS
 TRUE = Presence(WALL_NS, "PM1", 42, 5, 1, (1, 7), 9, 2, WALL_NS - 3600 * NS_PER_S, 100, standing_ns=7, standing_seat=7)
@@ -31,7 +31,7 @@ IMAGE = BusImage(
     force_seat=(3,),
     force_order=(2,),
 )
-LIMITS = BusLimits(SEATS)
+LIMITS = BusLimits(PROCESS_SLOTS)
 
 
 def test_what_processes_say_is_taken():

@@ -47,7 +47,7 @@ TWO = """10 COMMON A%, B%
 WIND_A = """100 CALL SCAN_LOOP(TICKS=2)
 200 END
 """
-SEATS = ((0, 5), (1,), (2, 10))
+PROCESS_SLOTS = ((0, 5), (1,), (2, 10))
 
 
 def config_in(folder: Path, text: str = RACK) -> RackConfig:
@@ -74,22 +74,22 @@ class Process:
 
     def hear(self, other: Process, most: int | None = None) -> None:
         """Take what another has sent and this one has not taken, at most some batches."""
-        first = self.taken.get(other.link.seat, 0)
+        first = self.taken.get(other.link.process_slot, 0)
         batches = other.sent[first:] if most is None else other.sent[first : first + most]
-        self.taken[other.link.seat] = first + len(batches)
+        self.taken[other.link.process_slot] = first + len(batches)
         for batch in batches:
             self.link.receive(batch)
 
 
 def cut(config: RackConfig) -> list[Process]:
     """Return the rack's processes, started."""
-    return [process.start() for process in [Process(config, slots) for slots in SEATS]]
+    return [process.start() for process in [Process(config, slots) for slots in PROCESS_SLOTS]]
 
 
 def settle(processes: list[Process]) -> None:
-    """Let all hear all, until nobody has anything to say."""
+    """Let all hear all, until none has anything left to send."""
     while any(
-        process.taken.get(other.link.seat, 0) < len(other.sent)
+        process.taken.get(other.link.process_slot, 0) < len(other.sent)
         for process in processes
         for other in processes
         if other is not process

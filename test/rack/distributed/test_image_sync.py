@@ -15,7 +15,7 @@ from automax_ros.rack.distributed.image_sync import MOST_AHEAD_NS, Batch, ImageC
 from automax_ros.rack.distributed.versions import VersionedValue
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
-from rack.distributed.parts import ONE, SEATS, Process, config_in, cut, image, settle
+from rack.distributed.parts import ONE, PROCESS_SLOTS, Process, config_in, cut, image, settle
 
 WRITTEN = {
     "A%": st.integers(-32768, 32767),
@@ -88,7 +88,7 @@ def note(model, process, name, value, order):
     """Keep, for each bit of a register and each plain common, the value with the greatest version."""
     memory = process.rack.memory
     view = memory.view(name)
-    version = (process.rack.now_ns, process.link.seat, order)
+    version = (process.rack.now_ns, process.link.process_slot, order)
     if view not in memory.registers.views:
         model[name, 0] = max(model.get((name, 0), ((-1,), None)), (version, value), key=lambda item: item[0])
         return
@@ -108,18 +108,18 @@ def shown(process, place, bit):
 
 
 def test_a_task_of_one_process_feeds_a_task_of_another(config):
-    home, one, two = processes = cut(config)
+    memory_process, one, two = processes = cut(config)
     for _ in range(20):
         run(processes, 0.0055)
-    assert one.rack.value("A%") == two.rack.value("A%") == home.rack.value("A%") == 7 + 20
+    assert one.rack.value("A%") == two.rack.value("A%") == memory_process.rack.value("A%") == 7 + 20
     # TWO latches what ONE wrote in the tick before.
-    assert home.rack.value("B%") == 7 + 19
+    assert memory_process.rack.value("B%") == 7 + 19
     assert [task.name for task in one.rack.tasks] == ["ONE"]
     assert two.rack.part.tasks == ["TWO", "WIND_A"]
 
 
 def test_presets_are_everybodys_own_and_a_write_wins_over_those_that_come_late(config):
-    early, late = Process(config, SEATS[1]), Process(config, SEATS[2])
+    early, late = Process(config, PROCESS_SLOTS[1]), Process(config, PROCESS_SLOTS[2])
     early.start()
     early.rack.write("A%", 99)
     late.link.receive(early.sent[-1])
@@ -129,17 +129,17 @@ def test_presets_are_everybodys_own_and_a_write_wins_over_those_that_come_late(c
 
 
 def test_a_scan_that_was_late_gives_way_to_what_was_written_after_its_deadline(config):
-    home, one, _ = idle(config)
-    home.rack.scheduler.pass_until(7 * NS_PER_MS)
-    home.rack.write("B%", 70)
-    home.rack.write("OUT3@", value=True)
-    one.hear(home)
+    memory_process, one, _ = idle(config)
+    memory_process.rack.scheduler.pass_until(7 * NS_PER_MS)
+    memory_process.rack.write("B%", 70)
+    memory_process.rack.write("OUT3@", value=True)
+    one.hear(memory_process)
     one.rack.memory.now_ns = 5 * NS_PER_MS
     one.rack.memory.commit([(one.rack.memory.view("B%"), 5), (one.rack.memory.view("OUT%"), 0)], writer=3)
     one.rack.observers.report_writes()
-    home.hear(one)
-    assert one.rack.value("B%") == home.rack.value("B%") == 70
-    assert one.rack.value("OUT%") == home.rack.value("OUT%") == 8
+    memory_process.hear(one)
+    assert one.rack.value("B%") == memory_process.rack.value("B%") == 70
+    assert one.rack.value("OUT%") == memory_process.rack.value("OUT%") == 8
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_a_scan_that_was_late_gives_way_to_what_was_written_after_its_deadline(c
 def test_a_scan_that_is_late_does_not_see_what_was_written_after_its_deadline(config, at_ns, kind, first, second):
     """The scan of 5.5 ms has not been made yet when the batch comes: it sees what it would have seen in time."""
     for way in ("write", "picture"):
-        two = Process(config, SEATS[2]).start()
+        two = Process(config, PROCESS_SLOTS[2]).start()
         two.rack.run(0.0055)
         view = two.rack.memory.view("A%")
         if way == "write":
@@ -177,7 +177,7 @@ def test_a_scan_that_is_late_does_not_see_what_was_written_after_its_deadline(co
 
 
 def test_what_start_up_parts_wrote_is_there_before_the_first_scans(config):
-    two = Process(config, SEATS[2]).start()
+    two = Process(config, PROCESS_SLOTS[2]).start()
     two.link.receive(Batch(1, 1, 0, 3, WriteKind.BASIC, ((two.rack.memory.view("A%"), 0, 40),)))
     two.rack.run(0.001)
     assert two.rack.value("B%") == 40
@@ -186,25 +186,25 @@ def test_what_start_up_parts_wrote_is_there_before_the_first_scans(config):
 @pytest.mark.parametrize("end", ["stop", "last", "lost"])
 def test_what_waits_for_its_time_is_taken_before_the_rack_stops_or_an_image_is_shown(config, end):
     """Else an output that was set before a STOP ALL came on again after it."""
-    home = Process(config, SEATS[0]).start()
-    home.rack.run(0.0055)
-    view = home.rack.memory.view("OUT7@")
-    tick = home.rack.scheduler.every(
+    memory_process = Process(config, PROCESS_SLOTS[0]).start()
+    memory_process.rack.run(0.0055)
+    view = memory_process.rack.memory.view("OUT7@")
+    tick = memory_process.rack.scheduler.every(
         5 * NS_PER_MS, 6 * NS_PER_MS, EventKey(EventClass.SCAN, 5, "late"), lambda *_: None
     )
-    home.link.receive(Batch(1, 1, 7 * NS_PER_MS, 3, WriteKind.COMMIT, ((view, 0, True),)))
-    assert home.rack.value("OUT7@") is False
+    memory_process.link.receive(Batch(1, 1, 7 * NS_PER_MS, 3, WriteKind.COMMIT, ((view, 0, True),)))
+    assert memory_process.rack.value("OUT7@") is False
     if end == "stop":
         cause = StopCause(8 * NS_PER_MS, "a fault", "31", "")
-        home.link.adopt(StopState(8 * NS_PER_MS, 1, cause))
+        memory_process.link.adopt(StopState(8 * NS_PER_MS, 1, cause))
     elif end == "last":
-        home.link.take_waiting()
+        memory_process.link.take_waiting()
     else:
-        held = {item.view for item in home.link.last_of(1).values}
-        assert home.rack.memory.registers.parts(view, 0, True)[0].bank in held
-    home.rack.scheduler.run_due(20 * NS_PER_MS)
+        held = {item.view for item in memory_process.link.last_of(1).values}
+        assert memory_process.rack.memory.registers.parts(view, 0, True)[0].bank in held
+    memory_process.rack.scheduler.run_due(20 * NS_PER_MS)
     tick.cancel()
-    assert home.rack.value("OUT7@") is (end != "stop")
+    assert memory_process.rack.value("OUT7@") is (end != "stop")
 
 
 def test_a_damaged_image_that_waits_for_its_time_ends_nothing(config):
@@ -215,7 +215,7 @@ def test_a_damaged_image_that_waits_for_its_time_ends_nothing(config):
             take()
         reported.append(raised)
 
-    two = Process(config, SEATS[2], guard=guard).start()
+    two = Process(config, PROCESS_SLOTS[2], guard=guard).start()
     two.rack.run(0.0055)
     word = next(iter(two.rack.memory.registers.views))
     two.link.merge(ImageCopy(1, (VersionedValue(word, 0, float("inf"), 0xFFFF, (6 * NS_PER_MS, 1, 1)),), ()))
@@ -238,13 +238,13 @@ def test_what_was_written_while_a_process_stood_still_comes_between_its_scans_in
 
 
 def test_a_force_holds_everywhere_until_it_is_released(config):
-    home, one, two = processes = cut(config)
-    home.rack.force("A%", 500)
+    memory_process, one, two = processes = cut(config)
+    memory_process.rack.force("A%", 500)
     settle(processes)
     run(processes, 0.011)
     assert one.rack.value("A%") == two.rack.value("A%") == 500
     assert [force.name for force in two.rack.forces()] == ["A%"]
-    home.rack.unforce("A%")
+    memory_process.rack.unforce("A%")
     settle(processes)
     run(processes, 0.011)
     assert two.rack.value("A%") == 502
@@ -252,12 +252,12 @@ def test_a_force_holds_everywhere_until_it_is_released(config):
 
 
 def test_a_stop_all_of_one_stops_all_and_outputs_are_off_everywhere(config):
-    home, one, two = processes = cut(config)
+    memory_process, one, two = processes = cut(config)
     one.rack.write("OUT7@", value=True)
     settle(processes)
     one.rack.run(0.001)
     one.rack.operations.stop_all("a fault of ONE", "14", "ONE")
-    for process in (home, two):
+    for process in (memory_process, two):
         process.link.adopt(one.link.standing)
     settle(processes)
     for process in processes:
@@ -277,14 +277,14 @@ def test_a_stop_all_of_one_stops_all_and_outputs_are_off_everywhere(config):
 
 def test_what_is_set_while_the_rack_stands_outlives_operations_of_any_process(config):
     """A part that stands is not stopped again because the same STOP ALL is told of once more."""
-    home, one, two = processes = cut(config)
+    memory_process, one, two = processes = cut(config)
     one.rack.run(0.001)
     one.rack.operations.stop_all("a fault of ONE", "14", "ONE")
-    for process in (two, home):
+    for process in (two, memory_process):
         process.rack.scheduler.pass_until(3 * NS_PER_MS)
         process.link.adopt(one.link.standing)
     settle(processes)
-    home.rack.write("A%", 44)
+    memory_process.rack.write("A%", 44)
     settle(processes)
     for process in processes:
         process.rack.operations.clear_errors()
@@ -297,7 +297,7 @@ def test_what_is_set_while_the_rack_stands_outlives_operations_of_any_process(co
 
 
 def test_a_stop_of_the_stimuli_is_one_stop_in_all_processes(config):
-    processes = [Process(config, slots, common=lambda: True) for slots in SEATS]
+    processes = [Process(config, slots, common=lambda: True) for slots in PROCESS_SLOTS]
     for process in processes:
         process.start()
         process.rack.operations.stop_all("STOP ALL of the stimuli")
@@ -305,48 +305,48 @@ def test_a_stop_of_the_stimuli_is_one_stop_in_all_processes(config):
 
 
 def test_a_stop_and_a_run_at_one_instant_are_told_in_their_order(config):
-    home, one, _ = processes = cut(config)
+    memory_process, one, _ = processes = cut(config)
     assert {process.rack.now_ns for process in processes} == {0}
     for _ in range(2):
-        home.rack.operations.stop_all("by hand")
-        one.link.adopt(home.link.standing)
+        memory_process.rack.operations.stop_all("by hand")
+        one.link.adopt(memory_process.link.standing)
         assert one.rack.operations.stopped is not None
         one.rack.operations.run_all()
-        home.link.adopt(one.link.standing)
-        assert home.rack.operations.stopped is None
+        memory_process.link.adopt(one.link.standing)
+        assert memory_process.rack.operations.stopped is None
 
 
 def test_a_process_that_joins_takes_over_what_the_others_hold(config):
-    home, one, two = processes = cut(config)
+    memory_process, one, two = processes = cut(config)
     run(processes, 0.05)
-    home.rack.write("T%", 44, element=2)
-    home.rack.write("S$", "HELLO")
-    home.rack.write("OUT3@", value=True)
-    home.rack.force("GO@", value=True)
+    memory_process.rack.write("T%", 44, element=2)
+    memory_process.rack.write("S$", "HELLO")
+    memory_process.rack.write("OUT3@", value=True)
+    memory_process.rack.force("GO@", value=True)
     settle(processes)
-    again = Process(config, SEATS[1])
-    again.rack.join(60 * NS_PER_MS, lambda: again.link.merge(home.link.picture()))
+    again = Process(config, PROCESS_SLOTS[1])
+    again.rack.join(60 * NS_PER_MS, lambda: again.link.merge(memory_process.link.picture()))
     again.link.starting = False
-    assert image(again) == image(home)
+    assert image(again) == image(memory_process)
     assert [force.name for force in again.rack.forces()] == ["GO@"]
     assert again.rack.task("ONE").scan_number == 0
     # The first scan comes at the next tick of the common grid: 60.5 ms.
     again.rack.run(0.0006)
     assert again.rack.task("ONE").scan_number == 1
-    assert again.rack.value("A%") == home.rack.value("A%") + 1
-    for process in (home, two):
+    assert again.rack.value("A%") == memory_process.rack.value("A%") + 1
+    for process in (memory_process, two):
         process.rack.scheduler.run_until(again.rack.now_ns)
         for batch in again.sent:
             process.link.receive(batch)
     again.hear(two)
-    home.hear(two)
-    assert image(home) == image(two) == image(again)
+    memory_process.hear(two)
+    assert image(memory_process) == image(two) == image(again)
     assert one.rack.task("ONE").scan_number > 1
 
 
 def test_what_happens_in_every_process_by_itself_is_sent_by_the_home_alone(config):
     acting = [False]
-    processes = [Process(config, slots, common=lambda: acting[0]) for slots in SEATS]
+    processes = [Process(config, slots, common=lambda: acting[0]) for slots in PROCESS_SLOTS]
     for process in processes:
         process.start()
         process.rack.operations.stop_tasks()
@@ -359,22 +359,22 @@ def test_what_happens_in_every_process_by_itself_is_sent_by_the_home_alone(confi
     # For a process that joins in the middle of a wave.
     assert [len(process.sent) - before for process, before in zip(processes, sent, strict=True)] == [1, 0, 0]
     # A write of 3 ms that comes now is older.
-    home, one, _ = processes
-    late = Process(config, SEATS[1]).start()
+    memory_process, one, _ = processes
+    late = Process(config, PROCESS_SLOTS[1]).start()
     late.rack.operations.stop_tasks()
     late.rack.scheduler.pass_until(3 * NS_PER_MS)
     late.rack.write("A%", 30)
-    home.link.receive(late.sent[-1])
-    assert home.rack.value("A%") == one.rack.value("A%") == 40
+    memory_process.link.receive(late.sent[-1])
+    assert memory_process.rack.value("A%") == one.rack.value("A%") == 40
 
 
 def test_all_hold_what_an_input_makes_of_a_value(config):
-    home, one, two = processes = idle(config)
-    view = home.rack.memory.view("B%")
-    home.rack.inputs.shape([(view, 0)], lambda value: int(value) & 7)
+    memory_process, one, two = processes = idle(config)
+    view = memory_process.rack.memory.view("B%")
+    memory_process.rack.inputs.shape([(view, 0)], lambda value: int(value) & 7)
     one.rack.write("B%", 15)
     settle(processes)
-    assert [process.rack.value("B%") for process in (home, one, two)] == [7, 7, 7]
+    assert [process.rack.value("B%") for process in (memory_process, one, two)] == [7, 7, 7]
 
 
 def test_the_part_of_a_rack_compiles_and_runs_its_own_tasks_alone(config):
@@ -388,13 +388,13 @@ def test_the_part_of_a_rack_compiles_and_runs_its_own_tasks_alone(config):
 
 
 def test_a_damaged_batch_changes_nothing(config):
-    home, one, _ = idle(config)
-    before = image(home)
+    memory_process, one, _ = idle(config)
+    before = image(memory_process)
     batch = one_write(one)
     view = one.rack.memory.view("A%")
     for entry in ((9999, 0, 1.0), (view, 3, 1.0), (view, 0, 40000.0), (view, 0, float("nan")), (view, 0, "X")):
-        home.link.receive(type(batch)(1, 77, 1, 0, batch.kind, (entry,)))
-    assert image(home) == before
+        memory_process.link.receive(type(batch)(1, 77, 1, 0, batch.kind, (entry,)))
+    assert image(memory_process) == before
     assert "N% = N% + 1" in ONE
 
 
@@ -404,27 +404,27 @@ def one_write(process):
 
 
 def test_the_last_writes_of_a_process_that_ended_in_the_middle_of_sending_reach_all(config):
-    home, one, two = idle(config)
+    memory_process, one, two = idle(config)
     one.rack.write("A%", 11)
     one.rack.write("OUT3@", value=True)
     one.rack.force("GO@", value=True)
-    home.hear(one)
-    assert image(home) != image(two)
-    for lost_by in (home, two):
-        picture = lost_by.link.last_of(one.link.seat)
-        for other in (home, two):
+    memory_process.hear(one)
+    assert image(memory_process) != image(two)
+    for lost_by in (memory_process, two):
+        picture = lost_by.link.last_of(one.link.process_slot)
+        for other in (memory_process, two):
             other.link.merge(picture)
-    assert image(home) == image(two)
+    assert image(memory_process) == image(two)
     assert two.rack.value("A%") == 11
     assert two.rack.value("OUT%") == 8
     assert [force.name for force in two.rack.forces()] == ["GO@"]
 
 
 def test_an_older_force_gives_way_to_a_newer_one(config):
-    home, one, _ = idle(config)
-    home.rack.scheduler.pass_until(5 * NS_PER_MS)
-    home.rack.force("B%", 50)
-    one.hear(home)
+    memory_process, one, _ = idle(config)
+    memory_process.rack.scheduler.pass_until(5 * NS_PER_MS)
+    memory_process.rack.force("B%", 50)
+    one.hear(memory_process)
     one.rack.force("B%", 10)
-    home.hear(one)
-    assert one.rack.value("B%") == home.rack.value("B%") == 50
+    memory_process.hear(one)
+    assert one.rack.value("B%") == memory_process.rack.value("B%") == 50

@@ -62,7 +62,7 @@ class World:
         self.pacer = Pacer(self.rack.scheduler, clock=self.wall, wait=self.wall.wait)
         self.diagnostics = Diagnostics()
         self.health = Health()
-        site = SimpleNamespace(
+        rack_context = SimpleNamespace(
             rack=self.rack,
             stream=self.stream,
             pacer=self.pacer,
@@ -73,7 +73,7 @@ class World:
         publisher = SimpleNamespace(publish=self._note)
         node = SimpleNamespace(create_publisher=lambda *_: publisher)
         self.diagnostics.begin(self.rack, self.stream, self.pacer, node)
-        self.diagnostics.add(RackHealth(site, "rack: LINE1").statuses)
+        self.diagnostics.add(RackHealth(rack_context, "rack: LINE1").statuses)
         self.diagnostics.add(self._task)
         self.pacer.begin()
         self.stream.begin(EPOCH_NS)

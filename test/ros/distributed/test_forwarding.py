@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from functools import partial
 
 import pytest
-from rack.distributed.parts import SEATS, config_in
+from rack.distributed.parts import PROCESS_SLOTS, config_in
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.types.rack_files import files_of
@@ -18,7 +18,7 @@ RUN_ID = 77
 
 
 @contextmanager
-def running(folder, **seating):
+def running(folder, **layout_fields):
     """Three processes' parts of a rack, each on a thread of its own here, begun as it hears of the start."""
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
@@ -30,8 +30,8 @@ def running(folder, **seating):
     context = Context()
     context.init(args=["--ros-args", "--disable-stdout-logs"])
     executor = SingleThreadedExecutor(context=context)
-    taken = ProcessLayout(SEATS, RUN_ID, **seating)
-    parts = [RackNodes(Rack(config, local=s), context=context, seating=taken) for s in SEATS]
+    layout = ProcessLayout(PROCESS_SLOTS, RUN_ID, **layout_fields)
+    parts = [RackNodes(Rack(config, local=s), context=context, process_layout=layout) for s in PROCESS_SLOTS]
     for part in parts:
         part.add_to(executor)
     waiting = list(parts)
@@ -94,9 +94,9 @@ def test_processes_that_hear_of_the_start_when_it_is_over_join(tmp_path):
 def test_what_waits_on_the_bus_is_taken_before_it_counts_as_missing(racks):
     """A process whose door was held up hears how much the other has written before it has taken any of it."""
     _, one, two = racks["parts"]
-    two.bus._node.site.intake.stop()
-    peer, link = two.bus.peers.by_seat[1], one.bus.link
-    words = next(item for item in two.bus._node.site.intake._entrances if item.name.endswith("bus/presence"))
+    two.bus._node.rack_context.intake.stop()
+    peer, link = two.bus.peers.by_slot[1], one.bus.link
+    words = next(item for item in two.bus._node.rack_context.intake._entrances if item.name.endswith("bus/presence"))
     before, told = peer.received, link.sequence + 30
     deadline = time.monotonic() + PATIENCE_NS / NS_PER_S
     while peer.presence.sequence < told and time.monotonic() < deadline:
@@ -115,13 +115,13 @@ def test_what_waits_on_the_bus_is_taken_before_it_counts_as_missing(racks):
 def test_a_word_that_cannot_be_true_changes_nothing(racks, forged):
     """A stop later than any other would decide for ever how the rack stands, and no later one could be told."""
     _, one, two = racks["parts"]
-    word = two.bus.peers.by_seat[1].presence
-    seats = dict(two.bus.peers.by_seat)
+    word = two.bus.peers.by_slot[1].presence
+    peers = dict(two.bus.peers.by_slot)
     standing = two.bus.link.standing
     stop = {"stopped": True, "standing_ns": (1 << 63) - 1, "standing_seat": 1, "process": word.process + 1}
     two.bus._take_presence(word._replace(**stop | forged), b"a stranger")
     assert two.bus.link.standing == standing
-    assert two.bus.peers.by_seat == seats
+    assert two.bus.peers.by_slot == peers
     one.rack.operations.stop_all("to be told")
 
     def told() -> bool:

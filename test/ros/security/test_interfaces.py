@@ -81,10 +81,10 @@ def test_a_recorder_needs_no_more_than_its_enclave_allows(client, tmp_path):
 
 
 def test_processes_of_a_distributed_rack_have_enclaves_of_their_own(ros_domain_id):
-    from automax_ros.ros.security.profiles import enclaves_of_seats, operator_of
+    from automax_ros.ros.security.profiles import enclaves_of_processes, operator_of
 
     config = replace(config_of(LINE), namespace="plant/line1")
-    enclaves = {item.path: item for item in enclaves_of_seats(config, processes_of(config))}
+    enclaves = {item.path: item for item in enclaves_of_processes(config, processes_of(config))}
     assert list(enclaves) == ["/plant/line1/common_memory", "/plant/line1/processor_1", "/plant/line1/network_5"]
     network, processor = enclaves["/plant/line1/network_5"], enclaves["/plant/line1/processor_1"]
     assert "/plant/dcsnet/PAPER" in network.names("publish")

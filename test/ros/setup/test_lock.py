@@ -30,7 +30,7 @@ def test_lock_is_free_afterwards():
             pass
 
 
-def test_seats_share_a_rack_and_hold_their_own():
+def test_processes_share_a_rack_and_hold_their_own():
     with InstanceLock("line1", 7, "processor_1"), InstanceLock("line1", 7, "processor_2"):
         with pytest.raises(
             RackAlreadyRuns, match=rf"processor_1 of rack /line1 in ROS domain 7 runs already \(process {os.getpid()}\)"
@@ -40,7 +40,7 @@ def test_seats_share_a_rack_and_hold_their_own():
             pass
 
 
-def test_whole_rack_and_its_seats_exclude_each_other():
+def test_whole_rack_and_its_processes_exclude_each_other():
     with InstanceLock("line1", 7), pytest.raises(RackAlreadyRuns, match=rf"rack /line1 .* \(process {os.getpid()}\)"):
         InstanceLock("line1", 7, "processor_1").__enter__()
     with InstanceLock("line1", 7, "processor_1"):
@@ -94,7 +94,7 @@ def test_no_file_is_left_behind(folder):
     with InstanceLock("line1", 7, "processor_1"):
         with InstanceLock("line1", 7, "processor_2"):
             pass
-        assert len(list(folder.iterdir())) == 2, "the rack's own is shared, and one seat is held"
+        assert len(list(folder.iterdir())) == 2, "the rack's own is shared, and one process is held"
     assert list(folder.iterdir()) == []
     with InstanceLock("line1", 7), pytest.raises(RackAlreadyRuns):
         InstanceLock("line1", 7).__enter__()
