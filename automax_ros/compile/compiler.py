@@ -39,10 +39,19 @@ from functools import cached_property, partial
 from typing import Any, ClassVar, cast
 
 from automax_ros.compile.base import build
-from automax_ros.compile.base.assembly import Form, called, local_field, made, stores
+from automax_ros.compile.base.build import made
 from automax_ros.compile.base.cost import CostModel
-from automax_ros.compile.base.emitter import Emitter, block_prefix, forced_name, latched_name, variable_name
-from automax_ros.compile.base.layout import Layout, Role, StateField
+from automax_ros.compile.base.emitter import (
+    Emitter,
+    block_prefix,
+    called,
+    forced_name,
+    latched_name,
+    stores,
+    variable_name,
+)
+from automax_ros.compile.base.layout import Layout, Role, StateField, local_field
+from automax_ros.compile.base.native_source import Form
 from automax_ros.compile.base.scan_io import (
     BackgroundIo,
     LineForm,

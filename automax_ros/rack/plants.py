@@ -16,8 +16,7 @@ from automax_ros.rack.operations.operations import Operations
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.plants import FeedConfig, PlantConfig, build_plants, couple_plants
 from automax_ros.rackfile.model.writers import writers_of
-from automax_ros.runtime.memory.memory import CommonMemory
-from automax_ros.runtime.memory.process_inputs import ProcessInputs
+from automax_ros.runtime.memory.memory import CommonMemory, ProcessInputs
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 _AFTER_MODULES = 16

@@ -25,21 +25,30 @@ from automax_ros.rack.base.observers import Observers, RackObserver
 from automax_ros.rack.base.part import RackPart
 from automax_ros.rack.base.stop_cause import OperationsState
 from automax_ros.rack.base.views import backplane_of, view_specs
-from automax_ros.rack.modules.building import build_module
-from automax_ros.rack.modules.module import Module, ModuleState
+from automax_ros.rack.modules.drive import DriveControllerModule
+from automax_ros.rack.modules.drive_io import DriveAnalogModule
+from automax_ros.rack.modules.io_module import IoModule
+from automax_ros.rack.modules.module import Module, ModuleState, ProcessorModule, QuietModule
+from automax_ros.rack.modules.network import NetworkModule
+from automax_ros.rack.modules.udc import UdcModule
 from automax_ros.rack.operations.forces import Force, ForceTable, Target
 from automax_ros.rack.operations.operations import Operations, begin_memory
 from automax_ros.rack.operations.values import ValueOperations
 from automax_ros.rack.plants import PlantFeeds, PlantSampling, RackPlants
-from automax_ros.rack.tasks.installation import Finding, Installation
+from automax_ros.rack.tasks.installation import Finding, Installation, RackServices
 from automax_ros.rack.tasks.scheduled_task import ScanEnd, ScheduledTask, TaskStatistics
-from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.config import RackConfig, Timing
-from automax_ros.rackfile.model.value_names import common_named
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.model.plants import full_speeds
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER, WriterSpec, writers_of
+from automax_ros.rackfile.modules.common_memory import CommonMemoryConfig
+from automax_ros.rackfile.modules.drive import DriveAnalogConfig, DriveConfig
+from automax_ros.rackfile.modules.io import IoConfig
+from automax_ros.rackfile.modules.network import NetworkConfig
+from automax_ros.rackfile.modules.processor import Pc3000Config, ProcessorConfig
+from automax_ros.rackfile.modules.udc import UdcConfig
 from automax_ros.runtime.memory.common_clock import CommonClock
-from automax_ros.runtime.memory.memory import CommonMemory
-from automax_ros.runtime.memory.process_inputs import ProcessInputs
+from automax_ros.runtime.memory.memory import CommonMemory, ProcessInputs
 from automax_ros.runtime.scan.channels import Channels
 from automax_ros.runtime.scan.drives import Drives
 from automax_ros.runtime.scan.events import Events
@@ -48,6 +57,42 @@ from automax_ros.runtime.scan.modeled_execution import ModeledExecution
 from automax_ros.runtime.tasks.interrupts import Interrupts
 from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, Task
 from automax_ros.runtime.time.scheduler import Scheduler
+
+
+def build_module(config: ModuleConfig, parts: RackServices) -> Module:
+    """Return the module of a running rack for a configuration."""
+    return _BUILDERS[type(config)](config, parts)
+
+
+def _processor(config: ProcessorConfig, parts: RackServices) -> Module:
+    in_order = sorted(config.tasks, key=lambda item: (item.priority, item.name))
+    execution = parts.execution(config.name)
+    return ProcessorModule(config, tasks=[parts.install(item, execution) for item in in_order])
+
+
+def _drive(config: DriveConfig, parts: RackServices) -> Module:
+    plant = None if config.plant is None else parts.plants.get(config.plant.name)
+    full_rpm = None if config.plant is None else full_speeds(parts.config.feeds).get(config.plant.name)
+    return DriveControllerModule(config, parts, plant, full_rpm)
+
+
+def _drive_analog(config: DriveAnalogConfig, parts: RackServices) -> Module:
+    module = DriveAnalogModule(config, parts)
+    if config.drive is not None:
+        parts.drives.wire_voltage(config.drive, module.show_voltage)
+    return module
+
+
+_BUILDERS: dict[type, Callable[[Any, RackServices], Module]] = {
+    ProcessorConfig: _processor,
+    Pc3000Config: _processor,
+    CommonMemoryConfig: lambda config, _: QuietModule(config),
+    IoConfig: IoModule,
+    DriveConfig: _drive,
+    DriveAnalogConfig: _drive_analog,
+    NetworkConfig: NetworkModule,
+    UdcConfig: UdcModule,
+}
 
 
 @dataclass(frozen=True)
@@ -256,7 +301,7 @@ class Rack:
             NameFault, MemoryValueError: as ``start``.
         """
         for name, value in settings:
-            found = common_named(self.config, name)
+            found = self.config.common(name)
             self.inputs.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
         self.observers.report_writes()
 

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
-from automax_ros.core.json_schema import Keys, Schema, document, named, section
+from automax_ros.core.diagnostics import Diagnostic, Note, SourceText, Span
+from automax_ros.core.json_schema import Keys, Schema, document, either, entries, named, section
+from automax_ros.core.kinds import Direction
 from automax_ros.core.text import did_you_mean, quoted
-from automax_ros.core.yaml_text import Node, read_yaml
-from automax_ros.rackfile.model.config import CommonVariable, ModuleLoss, RackConfig, Timing, bank_variables
+from automax_ros.core.types import DataType
+from automax_ros.core.yaml_text import Mapping, Node, Scalar, read_yaml
+from automax_ros.rackfile.model.config import MAX_SLOT, CommonVariable, ModuleLoss, RackConfig, Timing
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.ros_names import namespace
+from automax_ros.rackfile.modules.kind import ModuleSection, PlacedModule, RackLayout
+from automax_ros.rackfile.modules.registry import KINDS, NOT_YET, REFUSED, SUPPORTED, module_number, spellings
 from automax_ros.rackfile.reading.executive import EXECUTIVE, NEWEST
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.rackfile.reading.names import RACK_NAME, is_rack_name
 from automax_ros.rackfile.reading.values import (
+    Entry,
     Key,
     ProblemList,
     Section,
@@ -26,18 +32,124 @@ from automax_ros.rackfile.reading.values import (
     flag_key,
     schemas,
     text_value,
+    wrong_kind,
 )
 from automax_ros.rackfile.sections.commons import SCHEMA as COMMON_SCHEMA
 from automax_ros.rackfile.sections.commons import CommonReader
 from automax_ros.rackfile.sections.feeds import read_feeds
 from automax_ros.rackfile.sections.joints import read_commands
 from automax_ros.rackfile.sections.plants import SCHEMA as PLANTS_SCHEMA
-from automax_ros.rackfile.sections.plants import read_plants
+from automax_ros.rackfile.sections.plants import Plants, read_plants
 from automax_ros.rackfile.sections.tasks import TaskReader
 from automax_ros.rackfile.sections.watch import SCHEMA as WATCH_SCHEMA
 from automax_ros.rackfile.sections.watch import read_watch
-from automax_ros.rackfile.slots import SCHEMA as SLOTS_SCHEMA
-from automax_ros.rackfile.slots import SlotReader
+
+_SLOT = re.compile(r"[0-9]{1,3}\Z")
+SLOTS_SCHEMA: Schema = entries(
+    "What stands in the rack, by slots 0 to 15.",
+    f"^0*({'|'.join(map(str, range(MAX_SLOT + 1)))})$",
+    either(
+        "A module.",
+        *(
+            section(f"{model}: {text}.", {"module": spellings(model), **kind.options}, ("module",))
+            for kind in KINDS
+            for model, text in kind.models.items()
+        ),
+    ),
+)
+
+
+class SlotReader:
+    """Reads the ``slots`` section."""
+
+    def __init__(self, tasks: TaskReader, findings: ProblemList, executive: int, plants: Plants) -> None:
+        self._executive, self._plants, self._tasks, self._findings = executive, plants, tasks, findings
+        self._placed: dict[int, PlacedModule] = {}
+        self._places: dict[int, Span] = {}
+        self._complete = True
+        self.unread: frozenset[int] = frozenset()
+
+    def read(self, node: Node, span: Span) -> tuple[ModuleConfig, ...]:
+        """Return the modules without errors, in the order of slots; ``span`` is the place of the key ``slots``.
+
+        ``unread`` are then the slots of the others: their errors are reported, and consequences of these need not be.
+        """
+        entries = entries_of(node, "slots", self._findings)
+        if entries is None:
+            return ()
+        modules: list[ModuleConfig] = []
+        for key, value in entries:
+            slot = self._slot(key)
+            if slot is None:
+                continue
+            self._places[slot] = key.span
+            module = self._module(slot, key, value)
+            self._complete = self._complete and module is not None
+            if module is not None:
+                modules.append(module)
+        in_order = tuple(sorted(modules, key=lambda item: item.slot))
+        self.unread = frozenset(self._places) - {item.slot for item in modules}
+        rack = RackLayout(list(self._placed.values()), self._complete, span, self._findings, in_order)
+        for kind in KINDS:
+            kind.check_places(rack)
+        return in_order
+
+    def _slot(self, key: Scalar) -> int | None:
+        if not _SLOT.match(key.text) or not 0 <= int(key.text) <= MAX_SLOT:
+            self._complete = False
+            self._findings.add("AMX6200", f"{quoted(key.text)} is not a slot; slots are 0 to {MAX_SLOT}", key.span)
+            return None
+        slot = int(key.text)
+        if slot not in self._places:
+            return slot
+        first = self._places[slot]
+        held = f"holds {_described(self._placed[slot])}" if slot in self._placed else "is defined"
+        message = f"slot {slot} already {held} (line {first.line})"
+        self._findings.add("AMX6201", message, key.span, notes=(Note("first defined here", first),))
+        return None
+
+    def _module(self, slot: int, key: Scalar, node: Node) -> ModuleConfig | None:
+        what = f"slot {slot}"
+        if not isinstance(node, Mapping):
+            given = module_number(node.text) if isinstance(node, Scalar) and len(node.text) < 10 else ""
+            hint = f"write {{module: {given if given in SUPPORTED else '57C435'}}}"
+            wrong_kind(node, what, "keys and values", self._findings, hint)
+            return None
+        model = self._model(node.entries, what, key)
+        if model is None:
+            return None
+        kind = SUPPORTED[model]
+        placed = self._placed[slot] = PlacedModule(slot, model, kind, key.span)
+        known, what = ("module", *kind.options), _described(placed)
+        section = Section(node.entries, what, known, self._findings, owner=f"{what} in slot {slot}")
+        return kind.read(ModuleSection(slot, model, section, key.span, self._tasks, self._executive, self._plants))
+
+    def _model(self, entries: tuple[Entry, ...], what: str, key: Scalar) -> str | None:
+        """Return the number of an emulated module; report AMX6202 to AMX6204 and AMX6211 for others."""
+        node = next((value for name, value in entries if name.text == "module"), None)
+        if node is None:
+            self._findings.add("AMX6009", f"{what} lacks the key 'module'", key.span)
+            return None
+        text = text_value(node, f"module of {what}", self._findings, limit=20)
+        if text is None:
+            return None
+        model = module_number(text)
+        if model in SUPPORTED:
+            return model
+        if model in REFUSED:
+            code, message, hint = REFUSED[model]
+            self._findings.add(code, message, node.span, hint)
+        elif model in NOT_YET:
+            self._findings.add("AMX6203", f"the {model} ({NOT_YET[model]}) is not supported yet", node.span)
+        else:
+            hint = f"the emulator has {', '.join(SUPPORTED)}"
+            self._findings.add("AMX6202", f"{quoted(text)} is not a module that the emulator knows", node.span, hint)
+        return None
+
+
+def _described(placed: PlacedModule) -> str:
+    return f"{placed.kind.word} {placed.model}"
+
 
 _START = Span(1, 1, 2)
 _NAME_LINE = re.compile(r"""^rack[ ]*:[ ]*(?:["']?)(\w{1,8})(?:["']?)[ ]*(?:#.*)?$""", re.MULTILINE)
@@ -175,7 +287,7 @@ def _read_rack(root: Node, text: str, tasks: TaskReader, path: Path, findings: P
         _check_size(variables, modules, section.key_span("common"), findings)
     feeds = read_feeds(plants.feeds, variables, modules, findings)
     commands = read_commands(plants.joints, variables, findings)
-    everything = (*variables, *bank_variables(modules))
+    everything = (*variables, *_bank_variables(modules))
     shown = read_watch(watch, everything, findings) if watch is not None else None
     if name is None or findings.errors:
         return None
@@ -207,3 +319,19 @@ def _check_size(
     if holder is not None and needed > holder.common_registers:
         message = f"the common variables take {needed} registers; the {holder.model} has {holder.common_registers}"
         findings.add("AMX6409", message, span)
+
+
+def _bank_variables(modules: Iterable[ModuleConfig]) -> list[CommonVariable]:
+    """Return a variable for the registers of each module that has some; it is not visible on ROS."""
+    return [
+        CommonVariable(
+            f"SLOT:{module.slot}%",
+            DataType.INTEGER,
+            (module.registers.count,),
+            direction=Direction.CLOSED,
+            line=module.line,
+            bank=module.slot,
+        )
+        for module in modules
+        if module.registers.count
+    ]

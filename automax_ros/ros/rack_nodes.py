@@ -47,13 +47,12 @@ from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.clock import RackClock
 from automax_ros.ros.base.lifecycle import ACTIVE, INACTIVE, Pending, TransitionRefused
 from automax_ros.ros.base.module_lifecycle import DEACTIVATED, ManagedModuleNode
-from automax_ros.ros.base.node import SIM_TIME, ModuleNode, RackContext, follows_clock
+from automax_ros.ros.base.node import SIM_TIME, ModuleNode, RackContext, RackLock, follows_clock
 from automax_ros.ros.distributed.bus import DistributedMemory, ProcessLayout
 from automax_ros.ros.distributed.forwarding import RequestForwarder, operate_name
 from automax_ros.ros.distributed.presence import PresencePublisher
 from automax_ros.ros.intake.guard import MOST_TOLD
 from automax_ros.ros.intake.intake import MessageIntake
-from automax_ros.ros.intake.rack_lock import RackLock
 from automax_ros.ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.ros.nodes.operator import OperatorNode, OperatorServices
 from automax_ros.ros.nodes.processor import ProcessorNode

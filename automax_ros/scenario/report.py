@@ -16,8 +16,8 @@ from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.scan.error_log import ErrorLog, LogEntry
 from automax_ros.runtime.scan.scan_record import ScanRecord
 from automax_ros.runtime.tasks.task import Status, Task
+from automax_ros.scenario.stimuli.player import OperationRecord
 from automax_ros.scenario.stimuli.reader import RACK_ONLY
-from automax_ros.scenario.stimuli.wave_player import OperationRecord
 
 STATUS_WORDS = {
     Status.RUNNING: "running",

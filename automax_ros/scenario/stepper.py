@@ -27,7 +27,6 @@ from automax_ros.rack.base.stop_cause import StopCause
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.config import RackConfig, Timing
-from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.runtime.scan.execution import IDEAL, Job, Place, Steps
 from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
 
@@ -163,7 +162,7 @@ class Variables:
                 yield self._common(symbol.name) if common else self._of_task(f"{name}.{symbol.name}")
 
     def _common(self, name: str) -> Variable:
-        meant = common_named(self.rack.config, name)
+        meant = self.rack.config.common(name)
         view = self.rack.memory.view(meant.name)
         read = partial(self.rack.memory.read_now, view, meant.index)
         return Variable(meant.label, meant.variable.type, meant.variable.length, "", read)

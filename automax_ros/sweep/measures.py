@@ -16,7 +16,6 @@ from automax_ros.core.types import DataType
 from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
-from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.sweep import functions
 from automax_ros.sweep.functions import Accumulator
 
@@ -212,7 +211,7 @@ def _subject(function: Function, name: str, text: str, config: RackConfig) -> st
         if text.upper() not in tasks:
             raise UserError(f"the rack has no task {quoted(text)}", near_or_listed(text.upper(), tasks))
         return text.upper()
-    meant = common_named(config, text)
+    meant = config.common(text)
     if not _fits(meant.variable, function.subject):
         raise UserError(f"{name} is of {function.subject.value}; {meant.label} is a {meant.variable.type.word}")
     return meant.label

@@ -11,7 +11,7 @@ from automax_ros.core.types import DataType, Value, bare_name
 from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number, value_text, whole_number
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.model.value_names import Tuning, common_named, setting, tunables_of, tuning
+from automax_ros.rackfile.model.value_names import Tuning, setting, tunables_of, tuning
 from automax_ros.rackfile.plant_numbers import PlantNumber, plant_number
 
 
@@ -88,7 +88,7 @@ def variable_named(rack: Rack, text: str) -> Variable:
 
 def _common(rack: Rack, text: str) -> Variable:
     try:
-        meant = common_named(rack.config, text)
+        meant = rack.config.common(text)
     except NameFault as fault:
         raise UserError(fault.message, _tunable_hint(rack, text) or fault.hint) from fault
     kind = meant.variable.type

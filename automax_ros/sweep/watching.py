@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from automax_ros.core.types import Value
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.scan.scan_record import ScanRecord
 from automax_ros.runtime.tasks.task import Task
@@ -104,7 +103,7 @@ class Watch:
         """Ignore operations."""
 
     def _add(self, rack: Rack, measure: Measure, end_ns: int) -> None:
-        meant = common_named(rack.config, measure.subject)
+        meant = rack.config.common(measure.subject)
         view = rack.memory.view(meant.name)
         present = rack.memory.read_now(view, meant.index)
         assert not isinstance(present, str)

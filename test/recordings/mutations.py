@@ -17,8 +17,8 @@ from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
-from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.recordings.mcap.chunk_table import MESSAGE, ChunkTable, chunk_records, definition_at
+from automax_ros.recordings.mcap.mcap_output import MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.recordings.mcap.unpacking import Buffer
 
 HEAD = struct.Struct("<BQ")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from automax_ros.cli.operate.press import add_press_arguments, press_calls
-from automax_ros.cli.operate.requests import Action, Mode, ServiceCall
+from automax_ros.cli.operate.press import add_press_arguments
 from automax_ros.cli.operate.text import (
     error_lines,
     fields_of,
@@ -25,8 +26,62 @@ from automax_ros.cli.operate.watch import NAMES_HELP, add_watch_arguments, value
 from automax_ros.cli.options.values import seconds_above_0, whole_number
 from automax_ros.core.text import quoted, table
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.core.types import DataType, type_of_name
 from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.reading.files import FileFault, read_task_source
+
+
+@dataclass(frozen=True)
+class ServiceCall:
+    """One request: the service, its type as ``package/Type``, the request's fields, and what it concerns.
+
+    ``reword`` adapts texts of the rack for the user, such as names of files on this computer.
+    """
+
+    service: str
+    type_name: str
+    fields: Mapping[str, Any] = field(default_factory=dict)
+    of: str = ""
+    reword: Callable[[str], str] = str
+
+
+class Mode(Enum):
+    """How the requests of an action are sent: each once, repeatedly, or as a press of buttons."""
+
+    ONCE = "once"
+    WATCH = "watch"
+    PRESS = "press"
+
+
+def _done(_: ServiceCall, __: Any) -> str:
+    return "done"
+
+
+@dataclass(frozen=True)
+class Action:
+    """An action: its line of help, its arguments, its requests, and the presentation of answers.
+
+    ``read`` returns the data of an answer for JSON, ``lines`` the lines of text for these data, ``done_text`` the text
+    for an operation that was carried out. ``by_operator``: it needs a rack with the operator's services; ``acts``: it
+    changes something, although its answer is read. ``more`` returns the text below its help.
+    """
+
+    help: str
+    calls: Callable[[argparse.Namespace], list[ServiceCall]]
+    add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
+    read: Callable[[Any], Any] | None = None
+    lines: Callable[[Any], Iterable[str]] = lambda _: ()
+    done_text: Callable[[ServiceCall, Any], str] = _done
+    mode: Mode = Mode.ONCE
+    by_operator: bool = True
+    acts: bool = False
+    more: Callable[[], str] = str
+
+    @property
+    def reads(self) -> bool:
+        """Whether the action changes nothing in the rack."""
+        return self.read is not None and not self.acts
+
 
 STATE = "state"
 _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
@@ -34,6 +89,18 @@ _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 
 _MOST_STEPS = 1_000_000
 DEFAULT_TIMEOUT_S = "5"
+
+
+def _press_calls(given: argparse.Namespace) -> list[ServiceCall]:
+    """Return the requests that set all names.
+
+    Raises:
+        UsageError: a name is not that of a BOOLEAN.
+    """
+    for name in given.names:
+        if type_of_name(name.partition("(")[0].partition("[")[0].strip()) is not DataType.BOOLEAN:
+            raise UsageError(f"{quoted(name)} cannot be pressed", "a BOOLEAN can, such as START_PB@; set writes others")
+    return [ServiceCall("set", "automax_msgs/SetValue", {"name": name, "value": "TRUE"}, name) for name in given.names]
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -244,7 +311,7 @@ ACTIONS: Mapping[str, Action] = {
     ),
     "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger"), done_text=message_text),
     "set": Action("write commons once", _each_assignment("set"), _assignments, done_text=value_text),
-    "press": Action("hold BOOLEANs at TRUE for a while", press_calls, add_press_arguments, mode=Mode.PRESS),
+    "press": Action("hold BOOLEANs at TRUE for a while", _press_calls, add_press_arguments, mode=Mode.PRESS),
     "get": Action(
         "read commons, array elements, variables of tasks",
         lambda given: [ServiceCall("get", "automax_msgs/ReadValues", {"names": given.names})],

@@ -5,19 +5,18 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from automax_ros.cli.operate.requests import ServiceCall
 from automax_ros.cli.options.values import seconds_above_0
-from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.core.types import DataType, type_of_name
-from automax_ros.core.user_error import UsageError
+
+if TYPE_CHECKING:
+    from automax_ros.cli.operate.actions import ServiceCall
 
 DEFAULT_FOR_S = "0.2"
 _LOOK_S = 0.01
-_SET = "automax_msgs/SetValue"
 Answer = Callable[[ServiceCall, int], Any]
 """Sends a request, waits for at most a given time (ns), and returns the answer."""
 
@@ -33,18 +32,6 @@ def add_press_arguments(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_FOR_S,
         help=f"seconds for which it is held (default: {DEFAULT_FOR_S})",
     )
-
-
-def press_calls(given: argparse.Namespace) -> list[ServiceCall]:
-    """Return the requests that set all names.
-
-    Raises:
-        UsageError: a name is not that of a BOOLEAN.
-    """
-    for name in given.names:
-        if type_of_name(name.partition("(")[0].partition("[")[0].strip()) is not DataType.BOOLEAN:
-            raise UsageError(f"{quoted(name)} cannot be pressed", "a BOOLEAN can, such as START_PB@; set writes others")
-    return [ServiceCall("set", _SET, {"name": name, "value": "TRUE"}, name) for name in given.names]
 
 
 def press(
@@ -68,7 +55,7 @@ def press(
         _hold(given.held if pressed else 0, should_stop)
     finally:
         for call, _ in pressed:
-            released = answer(ServiceCall("set", _SET, {"name": call.of, "value": "FALSE"}, call.of), given.timeout)
+            released = answer(replace(call, fields={**call.fields, "value": "FALSE"}), given.timeout)
             if not released.ok:
                 found = [item if item[0] is not call else (call, released) for item in found]
     return found

@@ -7,9 +7,8 @@ import shlex
 import sys
 from collections.abc import Iterable
 
-from automax_ros.cli.operate.actions import ACTIONS, add_actions
-from automax_ros.cli.operate.requests import ServiceCall
-from automax_ros.cli.operate.session import Session, connected
+from automax_ros.cli.operate.actions import ACTIONS, ServiceCall, add_actions
+from automax_ros.cli.operate.ctl import Session, connected
 from automax_ros.cli.shell.prompt import Interrupt, edit_lines, typed_lines
 from automax_ros.core.user_error import UserError
 

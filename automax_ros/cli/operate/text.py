@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from automax_ros.cli.operate.requests import ServiceCall
 from automax_ros.cli.operate.watch import value_line
 from automax_ros.core.text import count_of
 from automax_ros.core.types import type_of_name
 from automax_ros.core.values import source_text, value_of
+
+if TYPE_CHECKING:
+    from automax_ros.cli.operate.actions import ServiceCall
 
 ALREADY = "was already"
 """Beginning of the text for a value that was set before."""

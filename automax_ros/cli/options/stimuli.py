@@ -8,9 +8,8 @@ from pathlib import Path
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.core.user_error import UsageError
 from automax_ros.rack.rack import Rack
-from automax_ros.scenario.stimuli.player import StimuliPlayer
+from automax_ros.scenario.stimuli.player import StimuliPlayer, Stimulus
 from automax_ros.scenario.stimuli.reader import StimuliFile, read_for_rack
-from automax_ros.scenario.stimuli.wave_player import Stimulus
 
 
 class StimuliRefused(Exception):

@@ -16,9 +16,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from automax_ros.cli.options.rack_name import config_of, names_file, space_of
 from automax_ros.cli.options.recording import split_seconds, storage_options
-from automax_ros.cli.options.ros import add_ros_arguments, prepare_ros, ros_arguments
+from automax_ros.cli.options.ros import add_ros_arguments, config_of, names_file, prepare_ros, ros_arguments, space_of
 from automax_ros.cli.options.values import seconds_above_0
 from automax_ros.cli.output.screen import StatusLine
 from automax_ros.cli.output.signals import StopRequest, stop_signals

@@ -25,8 +25,7 @@ from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.runtime.time.simulated_pacer import SimulatedTime
 from automax_ros.scenario.report import report_of
-from automax_ros.scenario.stimuli.player import StimuliPlayer
-from automax_ros.scenario.stimuli.wave_player import OperationRecord
+from automax_ros.scenario.stimuli.player import OperationRecord, StimuliPlayer
 
 
 @dataclass(frozen=True)

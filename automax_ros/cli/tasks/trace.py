@@ -42,10 +42,9 @@ from automax_ros.runtime.scan.error_log import LogEntry
 from automax_ros.runtime.tasks.standalone_task import LoneVariable, StandaloneTask
 from automax_ros.runtime.tasks.task import ScanRecord, Status
 from automax_ros.runtime.time.scheduler import Scheduler
-from automax_ros.scenario.stimuli.player import StimuliPlayer
+from automax_ros.scenario.stimuli.player import StimuliPlayer, Stimulus
 from automax_ros.scenario.stimuli.reader import read_for_task
 from automax_ros.scenario.stimuli.values import goes_on_for_ever
-from automax_ros.scenario.stimuli.wave_player import Stimulus
 
 _SCAN, _TIME = "scan", "time_s"
 _NOT_SET = (_SCAN, _TIME, "duration_ns", "skipped", "errors", "error_line", "error_code")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import gc
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 from automax_ros.core.types import Value
 
@@ -181,3 +183,24 @@ def is_simple(expression: ast.expr) -> bool:
     if isinstance(expression, ast.UnaryOp) and isinstance(expression.op, ast.USub):
         return isinstance(expression.operand, ast.Constant)
     return isinstance(expression, (ast.Name, ast.Constant))
+
+
+@contextmanager
+def collections_paused() -> Iterator[None]:
+    """Suspend garbage collection: a long task's tree is all alive, and scanning it takes most of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def made(definitions: list[ast.FunctionDef], name: str, known: dict[str, object]) -> dict[str, object]:
+    """Return the compiled functions of a task of this name; their only globals are ``known``."""
+    with collections_paused():
+        code = compile(placed(definitions), f"<{name}>", "exec")
+    found: dict[str, object] = {"__builtins__": {}, **known}
+    exec(code, found)
+    return found

@@ -11,8 +11,10 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from automax_ros.blocks.declare.declaration import HELPERS
 from automax_ros.compile.base import build
 from automax_ros.compile.base.cost import CostModel
+from automax_ros.compile.base.functions import BUILTINS, OPERATIONS
 from automax_ros.core.types import DataType, bare_name, type_of_name
 from automax_ros.language.program import Program, Symbol
 from automax_ros.language.tree.tree import Scope
@@ -234,3 +236,28 @@ class Emitter:
             return
         self.book_cost()
         self.emit(build.do(ast.Yield(build.name("cost"))), build.assign("cost", build.constant(0)))
+
+
+def assigned(body: list[ast.stmt]) -> frozenset[str]:
+    """Return the names that statements set."""
+    return frozenset(
+        node.id for node in build.nodes(*body) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    )
+
+
+def called(emitter: Emitter) -> dict[str, object]:
+    """Return the functions that the lowered statements call, by name."""
+    functions: dict[str, object] = dict(OPERATIONS)
+    functions.update({builtin.carry_out.__name__: builtin.carry_out for builtin in BUILTINS.values()})
+    functions.update(HELPERS)
+    return {**HELPERS, **{name: functions[name] for name in sorted(emitter.calls)}}
+
+
+def stores(fields: list[str], body: list[ast.stmt]) -> list[ast.stmt]:
+    """Return the stores of the fields that a body sets, one by one, which is faster than all at once."""
+    set_there = assigned(body)
+    return [
+        build.set_item("state", build.constant(position), build.name(name))
+        for position, name in enumerate(fields)
+        if name in set_there
+    ]

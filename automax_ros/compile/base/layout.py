@@ -13,6 +13,7 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 from automax_ros.core.types import DataType, Value
+from automax_ros.language.program import Symbol
 
 StateValue = Value | list[Value]
 """A field's value in the state: a list for an array."""
@@ -147,3 +148,19 @@ class Layout:
             state.append(part if field.is_array else part[0])
             position += field.size
         return state
+
+
+def local_field(symbol: Symbol) -> StateField:
+    """Return the field of a local variable or a tunable."""
+    if symbol.tuning is not None:
+        return StateField(symbol.name, symbol.type, Role.TUNABLE, symbol.tuning.current)
+    return StateField(
+        symbol.name,
+        symbol.type,
+        Role.LOCAL,
+        symbol.type.zero,
+        symbol.elements,
+        is_array=bool(symbol.dimensions),
+        dimensions=symbol.dimensions,
+        length=symbol.length,
+    )

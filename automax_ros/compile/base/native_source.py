@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 NOT_KEPT = "a run this short gains nothing by building it, and no other has (--native on)"
@@ -34,3 +36,12 @@ class NativeSource:
     name: str
     text: str
     limits: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class Form:
+    """One of a task's functions as a tree, its statements with their BASIC lines; its callees, and its commons."""
+
+    function: ast.FunctionDef
+    known: Mapping[str, object]
+    views: Mapping[str, int]

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from automax_ros.blocks.declare.coefficients import evaluate_noting
 from automax_ros.blocks.declare.declaration import Block, Coefficients, Limit, Relation
 from automax_ros.compile.base import build
-from automax_ros.compile.base.assembly import made
+from automax_ros.compile.base.build import made
 from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.blocks.tracing import node_of, traced
 from automax_ros.core.numbers import stored_real

@@ -2,15 +2,276 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable
+
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
+from automax_ros.core.text import did_you_mean
+from automax_ros.language.parse.basic_statements import WAITING_STATEMENTS
 from automax_ros.language.parse.cursor import Cursor
-from automax_ros.language.parse.open_blocks import FrameStack
-from automax_ros.language.parse.statement_reader import StatementReader
-from automax_ros.language.text.lines import END_OF_FILE, LineReader, LogicalLine
+from automax_ros.language.parse.expressions import expression, variable
+from automax_ros.language.parse.open_blocks import NESTING_LIMIT, FrameStack, too_deep
+from automax_ros.language.parse.statements import SIMPLE_STATEMENTS, assignment
+from automax_ros.language.parse.unknown import refuse_statement, refuse_word
+from automax_ros.language.text.lexer import END_OF_FILE, LineReader, LogicalLine
 from automax_ros.language.text.reporter import Reporter, SyntaxFaultError, TooManyProblemsError
-from automax_ros.language.text.tokens import Kind, SourceFault, Token
+from automax_ros.language.text.tokens import RESERVED_WORDS, STATEMENT_WORDS, Kind, SourceFault, Token
 from automax_ros.language.tree.task_kind import TaskKind, kind_of_source
-from automax_ros.language.tree.tree import Label, Module, Remark, Statement
+from automax_ros.language.tree.tree import Expression, For, Goto, If, Label, Module, Remark, Statement
+
+_BLOCK_WORDS = ("FOR", "NEXT", "END_IF", "ENDIF")
+_STATEMENTS = {TaskKind.CONTROL_BLOCK: SIMPLE_STATEMENTS, TaskKind.BASIC: {**SIMPLE_STATEMENTS, **WAITING_STATEMENTS}}
+_ELSE_IF = ("ELSEIF", "ELSIF", "ELSE_IF")
+
+
+class StatementReader:
+    """Reads statements into the open blocks of a task."""
+
+    def __init__(self, frames: FrameStack, kind: TaskKind) -> None:
+        self._frames = frames
+        self._kind = kind
+
+    def read(self, cursor: Cursor) -> None:
+        """Read one statement; raises SyntaxFaultError."""
+        token = cursor.current
+        if token.kind is Kind.WORD:
+            self._refuse_misspelt(cursor)
+            if token.text == "IF":
+                return self._if(cursor)
+            if token.text == "FOR":
+                return self._for(cursor)
+            if token.text == "NEXT":
+                return self._next(cursor)
+            if token.text == "ELSE":
+                return self._else(cursor)
+            if token.text == "END_IF":
+                cursor.advance()
+                return self._frames.end_if(cursor, token.span)
+        return self._frames.add(self._simple(cursor))
+
+    def recover(self, cursor: Cursor, start: int) -> None:
+        """Move past a statement that could not be read, and open or close the block that was meant."""
+        first = cursor.tokens[start]
+        failed, cursor.position = cursor.position, start
+        word = first.text if first.kind is Kind.WORD else ""
+        if word == "IF":
+            self._recover_if(cursor, first, failed)
+            return
+        following = cursor.following
+        assigns = following.kind is Kind.OPERATOR
+        cursor.skip_statement()
+        if word == "FOR" or (word and not assigns and _meant(word, "FOR")):
+            self._frames.open_wrong("FOR", first.span, doubtful=word != "FOR")
+        elif word in ("ENDIF", "ENDFI") or (word == "END" and following.text == "IF"):
+            self._frames.close_quietly("END_IF", first.span)
+        elif word in _ELSE_IF or (word == "ELSE" and not following.kind.ends_statement):
+            self._frames.close_quietly("ELSE", first.span)
+            cursor.skip_line()
+        elif word == "NEXT":
+            self._frames.close_quietly("NEXT", first.span)
+        elif word and not assigns:
+            for end in ("ELSE", "END_IF", "NEXT"):
+                if _meant(word, end):
+                    self._frames.close_quietly(end, first.span)
+
+    def _recover_if(self, cursor: Cursor, first: Token, failed: int) -> None:
+        """Decide by the rest of its line whether a wrong IF begins a block, and open it."""
+        assigns = cursor.tokens[failed].is_name and cursor.tokens[min(failed + 1, len(cursor.tokens) - 1)].text == "="
+        texts = []
+        while not cursor.at_end():
+            texts.append(cursor.advance().text)
+        if texts[-1] == "THEN":
+            self._frames.open_wrong("IF", first.span, doubtful=texts.count("THEN") > 1)
+            return
+        if "THEN" not in texts and not assigns and STATEMENT_WORDS.isdisjoint(texts[1:]):
+            self._frames.open_wrong("IF", first.span, doubtful=True)
+        cursor.skip_line()
+
+    def _refuse_misspelt(self, cursor: Cursor) -> None:
+        refuse_word(cursor, self._kind)
+        word = cursor.current.text
+        if cursor.following.text == "=":
+            return
+        if word == "ENDIF" or (word == "END" and cursor.following.text == "IF"):
+            cursor.fail("AMX0053", "the end of an IF is written END_IF", "write END_IF as one word with `_`")
+        if word in _ELSE_IF or (word == "ELSE" and not cursor.following.kind.ends_statement):
+            hint = "write a second IF on the next line and close it with an END_IF of its own"
+            cursor.fail("AMX0059", "ELSE stands alone on its line in the block form of IF", hint)
+
+    def _simple(self, cursor: Cursor) -> Statement:
+        start = cursor.position
+        token = cursor.current
+        read = self._reader(cursor) if token.kind is Kind.WORD else None
+        if read is not None:
+            statement = read(cursor, cursor.advance())
+        elif token.kind is Kind.NAME or (token.kind is Kind.WORD and _assigns(cursor)):
+            _check_glued_remark(cursor)
+            statement = assignment(cursor)
+        else:
+            refuse_statement(cursor)
+        return dataclasses.replace(statement, span=_span(cursor, start))
+
+    def _reader(self, cursor: Cursor) -> Callable[[Cursor, Token], Statement] | None:
+        """Return the reader of the statement that a word begins, None where the word names a variable or nothing."""
+        word = cursor.current.text
+        table = _STATEMENTS[self._kind]
+        if word in RESERVED_WORDS:
+            return table.get(word)
+        if cursor.following.text == "=" or (
+            cursor.following.text in ("(", "[") and _assigned_behind_parenthesis(cursor)
+        ):
+            return None
+        return table.get(word)
+
+    def _if(self, cursor: Cursor) -> None:
+        start = cursor.position
+        condition = self._condition(cursor)
+        if cursor.at_end():
+            self._frames.open(cursor, If(condition, ()), _span(cursor, start))
+            return
+        statement = self._one_line(cursor, start, condition, 1)
+        cursor.expect_end()
+        self._frames.add(statement)
+
+    def _condition(self, cursor: Cursor) -> Expression:
+        cursor.advance()
+        condition = expression(cursor)
+        if cursor.at("="):
+            cursor.fail("AMX0040", "a value is missing before `=`")
+        cursor.expect("THEN", "AMX0050", f"THEN is missing before {cursor.found()}")
+        return condition
+
+    def _one_line(self, cursor: Cursor, start: int, condition: Expression, depth: int) -> If:
+        if self._frames.depth + depth > NESTING_LIMIT:
+            raise SyntaxFaultError(too_deep("IF"), cursor.tokens[start].span)
+        then = self._branch(cursor, depth)
+        otherwise: tuple[Statement, ...] = ()
+        if cursor.accept("ELSE"):
+            otherwise = self._branch(cursor, depth)
+        return If(condition, then, otherwise, True, span=_span(cursor, start))
+
+    def _branch(self, cursor: Cursor, depth: int) -> tuple[Statement, ...]:
+        """Read a branch after THEN or ELSE on one line: a line number, or statements up to ELSE or the end."""
+        statements: list[Statement] = []
+        while True:
+            statements.append(self._branch_statement(cursor, depth))
+            if cursor.at_separator():
+                if cursor.following.kind is Kind.END:
+                    return tuple(statements)
+                cursor.advance()
+                if cursor.current.kind is Kind.REMARK or cursor.at("ELSE"):
+                    return tuple(statements)
+            elif cursor.at("ELSE"):
+                return tuple(statements)
+            else:
+                cursor.expect_end()
+                return tuple(statements)
+
+    def _branch_statement(self, cursor: Cursor, depth: int) -> Statement:
+        token = cursor.current
+        start = cursor.position
+        if cursor.at_end():
+            cursor.fail("AMX0036", f"a statement is missing after {cursor.previous.text}")
+        if token.kind is Kind.INTEGER and token.text.isdigit() and isinstance(token.value, int):
+            cursor.advance()
+            return Goto(token.value, span=token.span)
+        if token.kind is Kind.WORD:
+            self._refuse_behind_then(cursor)
+        if token.text == "IF":
+            condition = self._condition(cursor)
+            if cursor.at_end():
+                cursor.fail("AMX0060", "a block IF cannot stand after THEN", "give it a line of its own")
+            return self._one_line(cursor, start, condition, depth + 1)
+        return self._simple(cursor)
+
+    def _refuse_behind_then(self, cursor: Cursor) -> None:
+        word = cursor.current.text
+        if word in _BLOCK_WORDS and cursor.following.text != "=":
+            hint = "put nothing after THEN and the statements on lines of their own, closed by END_IF"
+            cursor.fail("AMX0060", f"{word} cannot stand after THEN on one line", hint)
+        refuse_word(cursor, self._kind)
+
+    def _for(self, cursor: Cursor) -> None:
+        start = cursor.position
+        cursor.advance()
+        form = "FOR variable = first TO last [STEP step]"
+        control = variable(cursor, "FOR")
+        if cursor.at("(", "["):
+            cursor.fail("AMX0077", "FOR needs a simple variable, not an array element")
+        cursor.expect("=", "AMX0035", f"`=` is missing after FOR {control.name[:20]}", form)
+        first = expression(cursor)
+        hint = (did_you_mean(cursor.current.text, ("TO",)) or form) if cursor.current.kind is Kind.WORD else form
+        cursor.expect("TO", "AMX0061", f"TO is missing before {cursor.found()}", hint)
+        last = expression(cursor)
+        step = expression(cursor) if cursor.accept("STEP") else None
+        if cursor.current.kind is Kind.WORD and step is None:
+            near = did_you_mean(cursor.current.text, ("STEP",))
+            cursor.fail("AMX0036", f"{cursor.found()} is not expected here", near)
+        cursor.expect_end()
+        self._frames.open(cursor, For(control, first, last, step, ()), _span(cursor, start))
+
+    def _next(self, cursor: Cursor) -> None:
+        start = cursor.advance()
+        if cursor.at_end():
+            cursor.fail("AMX0057", "NEXT needs the variable of its FOR", "NEXT I%")
+        control = variable(cursor, "NEXT")
+        if cursor.at(","):
+            cursor.fail("AMX0057", "NEXT ends one loop", "write a NEXT for each FOR")
+        cursor.expect_end()
+        self._frames.next(cursor, control, start.span)
+
+    def _else(self, cursor: Cursor) -> None:
+        token = cursor.advance()
+        self._frames.begin_else(cursor, token.span)
+
+
+def _span(cursor: Cursor, start: int) -> Span:
+    """Return the span from a token to the last read one on the same physical line."""
+    first = cursor.tokens[start].span
+    index = max(cursor.position - 1, start)
+    if cursor.tokens[index].span.line != first.line:
+        index = start
+        while cursor.tokens[index + 1].span.line == first.line:
+            index += 1
+    return first.to(cursor.tokens[index].span)
+
+
+def _assigns(cursor: Cursor) -> bool:
+    """Return whether a word is the name of a REAL variable that is assigned, or an element of a REAL array."""
+    if cursor.current.text in RESERVED_WORDS:
+        return False
+    if cursor.following.text not in ("(", "["):
+        return cursor.following.text == "="
+    inside = cursor.tokens[cursor.position + 2 : cursor.position + 4]
+    if len(inside) < 2 or inside[0].kind is not Kind.WORD or inside[1].text != "=":
+        return True
+    return _assigned_behind_parenthesis(cursor)
+
+
+def _assigned_behind_parenthesis(cursor: Cursor) -> bool:
+    """Return whether `=` follows the closing parenthesis: else NAME(WORD = ... is a block without its CALL."""
+    depth = 0
+    for index in range(cursor.position + 1, len(cursor.tokens) - 1):
+        token = cursor.tokens[index]
+        depth += (token.text in ("(", "[")) - (token.text in (")", "]"))
+        if depth == 0:
+            return cursor.tokens[index + 1].text == "="
+        if token.kind.ends_segment:
+            break
+    return False
+
+
+def _check_glued_remark(cursor: Cursor) -> None:
+    text = cursor.current.text
+    if text.endswith("!") and text[:-1] in STATEMENT_WORDS and cursor.following.text not in ("=", "(", "["):
+        hint = f"put a blank between {text[:-1]} and the `!` of a remark"
+        cursor.fail("AMX0035", f"`=` is missing: `{text}` is read as a DOUBLE INTEGER variable", hint)
+
+
+def _meant(word: str, meant: str) -> bool:
+    hint = did_you_mean(word, STATEMENT_WORDS)
+    return word not in STATEMENT_WORDS and hint == f"did you mean {meant}?"
+
 
 SOURCE_LIMIT = 1_000_000
 """Largest source, in characters (decision: a bound on untrusted texts)."""

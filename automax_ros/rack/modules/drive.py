@@ -41,8 +41,8 @@ from automax_ros.drive.plant.controller import DriveController
 from automax_ros.drive.plant.plant import DrivePlant
 from automax_ros.rack.modules.drive_io import DriveDigital
 from automax_ros.rack.modules.module import ModuleState
+from automax_ros.rack.tasks.installation import RackServices
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
-from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.drive import ACCESS_NS, DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
 from automax_ros.runtime.time.scheduler import NO_EVENT, EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler

@@ -15,10 +15,10 @@ from automax_ros.core.numbers import sign_extended
 from automax_ros.core.ticks import CLOCK_PERIOD_NS
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.modules.module import ModuleState
+from automax_ros.rack.tasks.installation import RackServices
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
-from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rackfile.model.module import Interrupt, ModuleConfig
-from automax_ros.runtime.memory.process_inputs import Freezer
+from automax_ros.runtime.memory.memory import Freezer
 from automax_ros.runtime.time.scheduler import NO_EVENT, EventClass, EventKey
 
 _COUNTER_BITS = 24

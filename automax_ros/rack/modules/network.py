@@ -25,7 +25,7 @@ from automax_ros.core.numbers import sign_extended
 from automax_ros.rack.modules.io_module import OwnRegisters
 from automax_ros.rack.modules.module import ModuleState, QuietModule
 from automax_ros.rack.modules.network_drops import DropMessage, NetworkStatus, Reception, Send, Sender
-from automax_ros.rack.tasks.services import RackServices
+from automax_ros.rack.tasks.installation import RackServices
 from automax_ros.rackfile.modules.network import (
     AREA,
     BROADCAST,

@@ -21,8 +21,8 @@ from automax_ros.language.tree.tree import Scope
 from automax_ros.rack.modules.io_module import OwnRegisters
 from automax_ros.rack.modules.module import ModuleState
 from automax_ros.rack.modules.udc_pmi import UdcPmis
+from automax_ros.rack.tasks.installation import RackServices
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
-from automax_ros.rack.tasks.services import RackServices
 from automax_ros.rack.tasks.triggers import Due
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.udc import (

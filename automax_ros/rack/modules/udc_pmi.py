@@ -15,7 +15,7 @@ from automax_ros.drive.pmi import registers as table
 from automax_ros.drive.pmi.pmi import Commands, Pmi
 from automax_ros.rack.modules.io_module import OwnRegisters
 from automax_ros.rack.modules.module import ModuleState
-from automax_ros.rack.tasks.services import RackServices
+from automax_ros.rack.tasks.installation import RackServices
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.modules.udc import RAIL_COUNTERS
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent

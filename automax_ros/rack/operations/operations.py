@@ -20,8 +20,7 @@ from automax_ros.rack.tasks.installation import Installation, PreparedReload, Ra
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.writers import PRESET_WRITER
-from automax_ros.runtime.memory.memory import CommonMemory
-from automax_ros.runtime.memory.process_inputs import ProcessInputs
+from automax_ros.runtime.memory.memory import CommonMemory, ProcessInputs
 from automax_ros.runtime.scan.channels import Channels
 from automax_ros.runtime.scan.events import Events
 from automax_ros.runtime.tasks.keep_values import carry_over

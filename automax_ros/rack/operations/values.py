@@ -20,10 +20,9 @@ from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operations.forces import ForceTable, Target
 from automax_ros.rack.operations.operations import POWER_OFF, Operations
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.model.value_names import common_named, tunables_of
+from automax_ros.rackfile.model.value_names import tunables_of
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER
-from automax_ros.runtime.memory.memory import CommonMemory
-from automax_ros.runtime.memory.process_inputs import ProcessInputs
+from automax_ros.runtime.memory.memory import CommonMemory, ProcessInputs
 from automax_ros.runtime.memory.views import MemoryValueError
 from automax_ros.runtime.tasks.keep_values import stepped
 from automax_ros.runtime.tasks.task import Task
@@ -68,7 +67,7 @@ class ValueOperations:
                     f"{quoted(name)} is a variable of task {owner.strip().upper()}: only common variables can be set"
                 )
                 self._refuse(what, reason, owner.strip().upper())
-            return common_named(self._config, name)
+            return self._config.common(name)
         except NameFault as fault:
             self._refuse(what, f"{fault.message}: {fault.hint}" if fault.hint else fault.message)
 

@@ -15,7 +15,6 @@ from automax_ros.core.values import source_text
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonVariable
-from automax_ros.rackfile.model.value_names import common_named
 
 MAX_NAME = 100
 """Longest name that is accepted, in characters (decision: a bound on what strangers send)."""
@@ -94,7 +93,7 @@ class Readings:
 
     def _common(self, name: str) -> Reading:
         try:
-            found = common_named(self._rack.config, name)
+            found = self._rack.config.common(name)
         except NameFault as fault:
             raise OperationRefused(f"{fault.message}: {fault.hint}" if fault.hint else fault.message) from fault
         return self._read(found.label, found.variable, found.index)

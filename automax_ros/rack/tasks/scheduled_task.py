@@ -10,7 +10,7 @@ from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.base.observers import Observers
 from automax_ros.rack.tasks.triggers import Due, MakeTrigger
-from automax_ros.runtime.memory.process_inputs import ProcessInputs
+from automax_ros.runtime.memory.memory import ProcessInputs
 from automax_ros.runtime.scan.execution import Execution, IdealExecution, Steps
 from automax_ros.runtime.tasks.task import OVERLAP, ScanRecord, Status, Task
 from automax_ros.runtime.time.scheduler import Scheduler

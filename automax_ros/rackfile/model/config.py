@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from automax_ros.core.kinds import Direction
-from automax_ros.core.names import Element
+from automax_ros.core.names import Element, element
 from automax_ros.core.types import DataType, Value
 from automax_ros.rackfile.model.module import ModuleConfig, Registers, TaskConfig
 from automax_ros.rackfile.model.plants import FeedConfig, JointCommand, PlantConfig
@@ -105,6 +105,8 @@ class CommonVariable:
         return self.preset if isinstance(self.preset, tuple) else (self.preset,) * self.elements
 
 
+NO_SUCH_COMMON = "the rack has no common variable"
+"""Begins the message about a name that is not that of a common."""
 CommonElement = Element[CommonVariable]
 """A simple common variable, or one element of an array."""
 
@@ -147,6 +149,14 @@ class RackConfig:
         """The variables that the file defines: all but the registers of modules."""
         return tuple(variable for variable in self.variables if variable.bank is None)
 
+    def common(self, name: str) -> CommonElement:
+        """Return the simple common, or the element of an array, with a name.
+
+        Raises:
+            NameFault: there is none.
+        """
+        return element(name, self.by_name, NO_SUCH_COMMON)
+
     def is_input(self, variable: CommonVariable) -> bool:
         """Return whether a variable shows an input: the process sets it, no task may write it."""
         point = variable.point
@@ -173,22 +183,6 @@ class RackConfig:
     def common_memory_slot(self) -> int:
         """The slot of the module that holds the common variables: the first that can."""
         return next((module.slot for module in self.modules if module.common_registers), 0)
-
-
-def bank_variables(modules: Iterable[ModuleConfig]) -> list[CommonVariable]:
-    """Return a variable for the registers of each module that has some; it is not visible on ROS."""
-    return [
-        CommonVariable(
-            f"SLOT:{module.slot}%",
-            DataType.INTEGER,
-            (module.registers.count,),
-            direction=Direction.CLOSED,
-            line=module.line,
-            bank=module.slot,
-        )
-        for module in modules
-        if module.registers.count
-    ]
 
 
 @dataclass(frozen=True)

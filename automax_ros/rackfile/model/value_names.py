@@ -6,15 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from automax_ros.core.kinds import Direction
-from automax_ros.core.names import PREDEFINED, Element, NameFault, element
+from automax_ros.core.names import PREDEFINED, Element, NameFault
 from automax_ros.core.names import setting as named_setting
 from automax_ros.core.types import DataType, Value, bare_name
 from automax_ros.language.program import Program, Symbol, lines_that_write
-from automax_ros.rackfile.model.config import CommonElement, RackConfig
+from automax_ros.rackfile.model.config import NO_SUCH_COMMON, CommonElement, RackConfig
 
 DEFAULT_WATCHED = 5
 """Most variables that a status line shows by default."""
-_ABSENT = "the rack has no common variable"
 
 
 def setting(config: RackConfig, text: str) -> tuple[str, Value]:
@@ -23,7 +22,7 @@ def setting(config: RackConfig, text: str) -> tuple[str, Value]:
     Raises:
         UserError: not of that form, no such common, the value does not fit, or the rack itself writes it (2.4.6).
     """
-    meant, value = named_setting(text, config.by_name, _ABSENT)
+    meant, value = named_setting(text, config.by_name, NO_SUCH_COMMON)
     if meant.name in PREDEFINED:
         raise NameFault(f"{meant.name} cannot be set: the rack itself writes it", "leave it out")
     return meant.label, value
@@ -41,7 +40,7 @@ def watched(
         NameFault: there is no such simple common or element.
     """
     if names is not None:
-        return [common_named(config, name) for name in names]
+        return [config.common(name) for name in names]
     if config.watch is not None:
         return config.watch
     written = {name for program in programs if not program.is_basic for name in lines_that_write(program)}
@@ -52,15 +51,6 @@ def watched(
     ]
     published.sort(key=lambda variable: variable.name not in written)
     return [Element(variable) for variable in published[:DEFAULT_WATCHED]]
-
-
-def common_named(config: RackConfig, name: str) -> CommonElement:
-    """Return the simple common, or the element of an array, with a name.
-
-    Raises:
-        NameFault: there is none.
-    """
-    return element(name, config.by_name, _ABSENT)
 
 
 @dataclass(frozen=True)

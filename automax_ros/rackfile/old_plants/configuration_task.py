@@ -16,7 +16,7 @@ from typing import NamedTuple
 from automax_ros.core.diagnostics import Diagnostic, Note, SourceText, Span, in_order
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType
-from automax_ros.language.text.lines import LineReader, LogicalLine
+from automax_ros.language.text.lexer import LineReader, LogicalLine
 from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
 from automax_ros.language.text.tokens import Kind, Token
 from automax_ros.rackfile.model.config import MAX_SLOT, Point

@@ -15,7 +15,7 @@ from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.text import count_of
 from automax_ros.core.types import MAX_STRING_LENGTH
 from automax_ros.language.text.constants import STRING_LIMIT
-from automax_ros.language.text.lines import END_OF_FILE, LineReader
+from automax_ros.language.text.lexer import END_OF_FILE, LineReader
 from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
 from automax_ros.language.text.tokens import Kind, Token
 

@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 from numpy.typing import NDArray
 
-from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.recordings.mcap.mcap_output import MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.recordings.mcap.unpacking import Buffer
 
 BLOCK_BYTES = 16 << 20

@@ -26,7 +26,6 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema
 
-from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.recordings.mcap.chunk_table import (
     DEFINITIONS,
     FIRST_PRIVATE_OPCODE,
@@ -35,7 +34,7 @@ from automax_ros.recordings.mcap.chunk_table import (
     chunk_records,
 )
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.mcap_output import MAGIC
+from automax_ros.recordings.mcap.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.recordings.mcap.opening import NO_BAG_HINT, opened
 from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Room, Unpacker
 

@@ -12,10 +12,9 @@ from mcap.records import Attachment, Metadata
 import automax_ros
 from automax_ros.core.kinds import WriteKind
 from automax_ros.messages.cdr.cdr import CdrError, decode
-from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD, ChunkBuilder
 from automax_ros.recordings.mcap.chunk_table import MESSAGE, WholeChunk, chunk_records
 from automax_ros.recordings.mcap.mcap_file import McapFile
-from automax_ros.recordings.mcap.mcap_output import McapOutput
+from automax_ros.recordings.mcap.mcap_output import MESSAGE_FIELDS, RECORD_HEAD, ChunkBuilder, McapOutput
 from automax_ros.recordings.mcap.metadata import BagMetadata, yaml_text
 from automax_ros.recordings.repair.contents import SCAN, WRITE, FileContents, FileSequence, Provenance
 from automax_ros.recordings.write.data_file import DataFile

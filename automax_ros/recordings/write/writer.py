@@ -23,9 +23,8 @@ from automax_ros.core.safe_file import sync_path
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.types.definitions import message_types, schema_text
 from automax_ros.messages.types.topics import QosProfile
-from automax_ros.recordings.mcap.chunk_builder import ChunkBuilder
 from automax_ros.recordings.mcap.errors import RecordingError
-from automax_ros.recordings.mcap.mcap_output import McapOutput
+from automax_ros.recordings.mcap.mcap_output import ChunkBuilder, McapOutput
 from automax_ros.recordings.mcap.metadata import (
     METADATA_FILE,
     BagMetadata,
@@ -35,8 +34,7 @@ from automax_ros.recordings.mcap.metadata import (
     qos_text,
     yaml_text,
 )
-from automax_ros.recordings.write.chunk_thread import ChunkThread
-from automax_ros.recordings.write.data_file import COMPRESSIONS, DataFile, StorageOptions
+from automax_ros.recordings.write.data_file import COMPRESSIONS, ChunkThread, DataFile, StorageOptions
 
 AT_ONCE_BYTES: Final = 1 << 16
 """A chunk of up to this many bytes, uncompressed, is written in the calling thread where no clock is followed

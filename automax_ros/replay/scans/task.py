@@ -8,6 +8,7 @@ from pathlib import Path
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import seconds_text
 from automax_ros.messages.types.messages import CommonWrite, Operation, Scan, TaskState
+from automax_ros.rack.tasks.installation import task_class
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.scans.carried_state import PartStart, Skipped
 from automax_ros.replay.scans.commons import RecordedCommons, UnknownValue
@@ -20,7 +21,6 @@ from automax_ros.replay.scans.stored_rack import ReplaySource, unknown_value
 from automax_ros.replay.scans.totals import MOST_NOTES, TaskTotals
 from automax_ros.replay.scans.tunables import Tunables
 from automax_ros.runtime.scan.error_log import snapshot_layout
-from automax_ros.runtime.tasks.make_task import task_class
 from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, Status, Task
 
 _MOST_NAMES = 8

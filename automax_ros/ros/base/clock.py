@@ -16,11 +16,10 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.cdr.cdr import CdrError, decode, encoder
 from automax_ros.messages.types.messages import Clock
 from automax_ros.messages.types.topics import QosProfile
-from automax_ros.ros.base.node import ModuleNode, RackContext
+from automax_ros.ros.base.node import ModuleNode, RackContext, RackLock
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
-from automax_ros.ros.intake.rack_lock import RackLock
-from automax_ros.ros.intake.raw_messages import TopicReader
+from automax_ros.ros.intake.rcl import TopicReader
 from automax_ros.runtime.time.following_pacer import FollowingPacer
 from automax_ros.runtime.time.pacer import Pace, Pacer
 from automax_ros.runtime.time.scheduler import Scheduler

@@ -12,15 +12,16 @@ from rclpy.qos import QoSPolicyKind
 
 from automax_ros.core.types import Value
 from automax_ros.messages.cdr.cdr import MAX_TRAILING, CdrError, decode
-from automax_ros.messages.types.topics import QosProfile
+from automax_ros.messages.types.topics import QosProfile, Topic
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rackfile.model.config import CommonVariable
+from automax_ros.rackfile.model.ros_names import set_topic
 from automax_ros.rackfile.model.writers import ROS_WRITER
 from automax_ros.rackfile.reading.scale import Scale
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
-from automax_ros.ros.intake.raw_messages import RawMessage, SequenceTracker, TopicReader
+from automax_ros.ros.intake.rcl import RawMessage, SequenceTracker, TopicReader
 from automax_ros.runtime.memory.views import MemoryValueError
 
 REFUSAL_INTERVAL_S = 1.0
@@ -28,6 +29,9 @@ REFUSAL_INTERVAL_S = 1.0
 COMMAND = QosProfile("reliable", "volatile", "keep_last", 10)
 BEST_EFFORT_COMMAND = QosProfile("best_effort", "volatile", "keep_last", 10)
 REFUSED = "refused write"
+_NUMBER_BYTES = 8
+_LAYOUT_BYTES = 1024
+"""Longest layout of an array's message that is read (decision)."""
 DROPPED = "dropped message"
 """Counted by ``Health``: messages that DDS dropped because they arrived faster than they were taken."""
 
@@ -154,3 +158,30 @@ class ScaledWriter:
                 self._is_logged = True
                 self._node.get_logger().warning(text)
         return counts
+
+
+def subscribe_values(node: ModuleNode, view: int, variable: CommonVariable, topic: Topic) -> None:
+    """Subscribe a node to the ``/set`` of one variable, the whole of it."""
+    name, scale = set_topic(topic.name), variable.scale
+    scaled = None if scale is None else ScaledWriter(node, name, variable, scale, variable.unit)
+
+    def elements_of(message: Any) -> list[tuple[int, Value]]:
+        return _elements(variable, message) if scaled is None else [(0, scaled.counts(message.data))]
+
+    # An element has at most 8 bytes, whatever its type, a character 4; an array's layout may contain names.
+    most_bytes = _LAYOUT_BYTES * variable.is_array + variable.elements * (_NUMBER_BYTES + 4 * variable.length)
+    subscribe_variable(node, name, topic.type_name, view, elements_of, most_bytes)
+
+
+def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:
+    """Return what a message writes, the whole variable, as (element, value).
+
+    Raises:
+        MemoryValueError: the length of an array message differs from the variable's.
+    """
+    if not variable.is_array:
+        return [(0, message.data)]
+    data = list(message.data)
+    if len(data) != variable.elements:
+        raise MemoryValueError(f"{variable.name} has {variable.elements} elements, the message has {len(data)}")
+    return list(enumerate(data))

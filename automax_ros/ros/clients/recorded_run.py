@@ -19,8 +19,7 @@ from dataclasses import dataclass, field
 from rclpy.node import Node
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.ros.intake.raw_messages import RawMessage
-from automax_ros.ros.intake.rcl import library
+from automax_ros.ros.intake.rcl import RawMessage, library
 
 PREFIX_BYTES = 12
 ALONE_NS = NS_PER_S

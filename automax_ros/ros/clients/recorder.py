@@ -35,7 +35,7 @@ from automax_ros.recordings.write.data_file import StorageOptions
 from automax_ros.ros.base.qos import message_class
 from automax_ros.ros.clients.recorded_run import MOST_TABLES, RecordedRun, participant
 from automax_ros.ros.distributed.recorder_wait import recorder_name
-from automax_ros.ros.intake.raw_messages import RawMessage, reader_of
+from automax_ros.ros.intake.rcl import RawMessage, reader_of
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.process import joined_context
 

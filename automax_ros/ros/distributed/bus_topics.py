@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile
 from automax_ros.messages.cdr.cdr import CdrError, decode
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import message_class
-from automax_ros.ros.intake.raw_messages import RawMessage, TopicReader
+from automax_ros.ros.intake.rcl import RawMessage, TopicReader
 
 PARTICIPANT_BYTES = 12
 """Length of the part of a GID that all publishers of one process share."""

@@ -19,7 +19,7 @@ from automax_ros.rack.operator.requests import VERBS, Concerns
 from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.distributed.bus import DistributedMemory
-from automax_ros.ros.intake.service_requests import DeferredResponse, Respond
+from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, conclude
 
 ANSWER_S = 2.0
 """Seconds to wait for another process."""
@@ -276,11 +276,3 @@ def _is_ok(answer: Any) -> bool:
 
 def _reason_of(answer: Any) -> str:
     return str(getattr(answer, "reason", getattr(answer, "message", "")))
-
-
-def conclude(response: Any, *, ok: bool, reason: str) -> Any:
-    """Fill in the outcome of a request; a message of a success stays. Return the response."""
-    for name, value in (("ok", ok), ("success", ok), ("reason", reason), ("message", reason)):
-        if hasattr(response, name) and (name != "message" or reason):
-            setattr(response, name, value)
-    return response

@@ -22,14 +22,13 @@ from automax_ros.core.kinds import Direction
 from automax_ros.core.types import Value
 from automax_ros.messages.types.rack_files import RackFile, files_of, files_text
 from automax_ros.messages.types.topics import LATCHED, Take, Topic
-from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.rackfile.model.plants import JointCommand
-from automax_ros.rackfile.model.ros_names import command_topic, set_topic
+from automax_ros.rackfile.model.ros_names import command_topic
 from automax_ros.rackfile.sections.joints import INTERFACES, UNITS
 from automax_ros.ros.base.node import MAIN_NODE, ModuleNode, RackContext
 from automax_ros.ros.base.qos import ros_qos
 from automax_ros.ros.base.rack_health import RackHealth
-from automax_ros.ros.base.write_topic import ScaledWriter, subscribe_variable
+from automax_ros.ros.base.write_topic import ScaledWriter, subscribe_values, subscribe_variable
 from automax_ros.runtime.memory.views import MemoryValueError
 
 TYPE = "std_msgs/msg/Float64MultiArray"
@@ -60,11 +59,6 @@ def subscribe_joint(node: ModuleNode, command: JointCommand) -> None:
     subscribe_variable(node, topic, TYPE, view, elements_of, MOST_BYTES)
 
 
-_NUMBER_BYTES = 8
-_LAYOUT_BYTES = 1024
-"""Longest layout of an array's message that is read (decision)."""
-
-
 class CommonMemoryNode(ModuleNode):
     """Serves the topics of common memory; its callbacks run between scans."""
 
@@ -84,7 +78,7 @@ class CommonMemoryNode(ModuleNode):
         for view, variable in enumerate(rack.config.variables):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
-                _subscribe_values(self, view, variable, topic)
+                subscribe_values(self, view, variable, topic)
         for command in rack.config.joint_commands:
             subscribe_joint(self, command)
         stream.add_sink(outlets.get)
@@ -114,29 +108,3 @@ class CommonMemoryNode(ModuleNode):
         if files != self._files:
             self._files = files
             self._config.publish(String(data=files_text(rack.config.name, files)))
-
-
-def _subscribe_values(node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
-    name, scale = set_topic(topic.name), variable.scale
-    scaled = None if scale is None else ScaledWriter(node, name, variable, scale, variable.unit)
-
-    def elements_of(message: Any) -> list[tuple[int, Value]]:
-        return _elements(variable, message) if scaled is None else [(0, scaled.counts(message.data))]
-
-    # An element has at most 8 bytes, whatever its type, a character 4; an array's layout may contain names.
-    most_bytes = _LAYOUT_BYTES * variable.is_array + variable.elements * (_NUMBER_BYTES + 4 * variable.length)
-    subscribe_variable(node, name, topic.type_name, view, elements_of, most_bytes)
-
-
-def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:
-    """Return what a message writes, the whole variable, as (element, value).
-
-    Raises:
-        MemoryValueError: the length of an array message differs from the variable's.
-    """
-    if not variable.is_array:
-        return [(0, message.data)]
-    data = list(message.data)
-    if len(data) != variable.elements:
-        raise MemoryValueError(f"{variable.name} has {variable.elements} elements, the message has {len(data)}")
-    return list(enumerate(data))

@@ -28,7 +28,7 @@ from automax_ros.rackfile.reading.names import is_rack_name
 from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
-from automax_ros.ros.intake.raw_messages import TopicReader
+from automax_ros.ros.intake.rcl import TopicReader
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 LOG_INTERVAL_S = 0.2

@@ -21,8 +21,8 @@ from automax_ros.ros.base.module_lifecycle import Background
 from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class
 from automax_ros.ros.clients.recorded_run import ALONE_NS, racks_of
-from automax_ros.ros.distributed.forwarding import RequestForwarder, conclude
-from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred
+from automax_ros.ros.distributed.forwarding import RequestForwarder
+from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred, conclude
 from automax_ros.ros.nodes.tables import task_fields
 
 Conclude = Callable[[Any, Any, Exception | None], Any]
@@ -135,15 +135,18 @@ class OperatorServices:
         """Execute a request in this process, and return its response."""
         with self._rack_context.between_scans():
             error: Exception | None = None
+            fields: Fields = {}
             try:
-                fields = VERBS[name].act(self._requests, **_fields_of(request))
-                _fill(response, {**(fields or {}), **self._of_the_graph(name)})
+                fields = VERBS[name].act(self._requests, **_fields_of(request)) or {}
+                _fill(response, {**fields, **self._of_the_graph(name)})
             except Exception as raised:
                 error = raised
-            return self._concluded(name, request, response, error)
+            return self._concluded(name, request, response, error, has_now="now" in fields)
 
-    def _concluded(self, name: str, request: Any, response: Any, error: Exception | None) -> Any:
-        """Return a response with the outcome of the request, and what is true now."""
+    def _concluded(
+        self, name: str, request: Any, response: Any, error: Exception | None, *, has_now: bool = False
+    ) -> Any:
+        """Return a response with the outcome of the request, and what is true now, unless it has that already."""
         reason = "" if error is None else str(error)
         if error is not None and not isinstance(error, OperationRefused):
             reason = f"{type(error).__name__}: {reason[:MOST_TOLD]}"
@@ -151,7 +154,7 @@ class OperatorServices:
         elif error is not None:
             self._node.guard.refused(name, reason, name)
         with suppress(OperationRefused):
-            _fill(response, VERBS[name].now(self._requests, **_fields_of(request)))
+            _fill(response, {} if has_now else VERBS[name].now(self._requests, **_fields_of(request)))
         return conclude(response, ok=error is None, reason=reason)
 
     def _of_the_graph(self, name: str) -> Fields:

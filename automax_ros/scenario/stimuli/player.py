@@ -1,13 +1,142 @@
-"""Executes the entries of a stimuli file at their times."""
+"""Executes the entries of a stimuli file at their times, and plays the waves that drive signals."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
+from automax_ros.core.types import Value
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
-from automax_ros.scenario.stimuli.wave_player import ENTRIES, Action, OperationRecord, Stimulus, WavePlayer, in_time
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
+from automax_ros.scenario.stimuli.signals import Signal
+from automax_ros.scenario.stimuli.waves import SAMPLE_NS, Wave
+
+
+class Action(Protocol):
+    """One action of an entry. ``of`` is its variable, task or slot; "" for the whole rack."""
+
+    @property
+    def of(self) -> str: ...  # noqa: D102
+
+    def do(self, stage: WavePlayer, /) -> None:
+        """Execute it, at the scheduler's present time.
+
+        Raises:
+            OperationRefused: it is not possible now; the text says why.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """An entry of a stimuli file: at a rack time, a verb with its actions. ``line`` is its line in the file.
+
+    ``is_value`` is TRUE for verbs that only write values, as the process does; the others operate the rack.
+    ``everywhere`` is TRUE if it writes the same in every process of a distributed rack.
+    """
+
+    at_ns: int
+    verb: str
+    line: int
+    actions: tuple[Action, ...]
+    is_value: bool
+    everywhere: bool = False
+
+
+class WavePlayer:
+    """Plays waves on signals by rack time: at most one on each, the latest.
+
+    ``is_sampling`` is TRUE while a wave writes a value.
+    """
+
+    def __init__(self, scheduler: Scheduler) -> None:
+        self.scheduler = scheduler
+        self.is_sampling = False
+        self._driven: dict[str, list[ScheduledEvent]] = {}
+        self._count = 0
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether a wave still runs."""
+        return bool(self._driven)
+
+    def set(self, signal: Signal, value: Value) -> None:
+        """Write a value; a wave that drove the signal ends.
+
+        Raises:
+            OperationRefused: it cannot be written now.
+        """
+        self.rest(signal)
+        signal.set(value)
+
+    def drive(self, signal: Signal, wave: Wave) -> None:
+        """Drive a signal with a wave from now on, in place of an earlier wave.
+
+        A sample is written if it differs from the present value, so a write by a task does not last.
+        """
+        self.rest(signal)
+        scheduler = self.scheduler
+        began, start = scheduler.now_ns, signal.read()
+        self._sample(signal, wave.value(0, start))
+        if wave.for_ns == 0:
+            return
+        key = self._key()
+
+        def end(_: int) -> None:
+            self.rest(signal)
+            last = wave.last()
+            if last is not None:
+                self._sample(signal, last)
+
+        def sample(now_ns: int, _: int) -> None:
+            self._sample(signal, wave.value(now_ns - began, start))
+
+        events = [] if wave.for_ns is None else [scheduler.at(began + wave.for_ns, key, end)]
+        events.append(scheduler.every(SAMPLE_NS, began + SAMPLE_NS, key, sample))
+        self._driven[signal.label] = events
+
+    def rest(self, signal: Signal) -> None:
+        """End the wave that drives a signal, if any; the signal's value stays."""
+        for event in self._driven.pop(signal.label, ()):
+            event.cancel()
+
+    def _sample(self, signal: Signal, value: Value) -> None:
+        if signal.read() != value:
+            self.is_sampling = True
+            try:
+                signal.write(value)
+            finally:
+                self.is_sampling = False
+
+    def _key(self) -> EventKey:
+        """Return the place of a wave's samples: waves that started earlier come first."""
+        self._count += 1
+        return EventKey(EventClass.OUTSIDE, _BEGUN, f"{self._count:09d}")
+
+
+_BEGUN = 0
+"""Priority, among outside events of one instant, of samples of waves that earlier entries started."""
+ENTRIES = 1
+"""Priority of entries: after what earlier entries began (decision), before all else."""
+
+
+@dataclass(frozen=True)
+class OperationRecord:
+    """Result of an action: ``what`` is the verb, ``why`` the reason of a refusal, if ``ok`` is FALSE."""
+
+    at_ns: int
+    what: str
+    of: str
+    ok: bool = True
+    why: str = ""
+
+
+def in_time(stimuli: Sequence[Stimulus]) -> list[Stimulus]:
+    """Return entries in the order of time; those of one instant keep the order of the file."""
+    return sorted(stimuli, key=lambda item: item.at_ns)
+
 
 _KEY = EventKey(EventClass.OUTSIDE, ENTRIES, "stimuli")
 

@@ -25,7 +25,6 @@ from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import CommonElement
-from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.reading.files import FileFault, read_task_source, stays_next_to
 from automax_ros.rackfile.reading.values import (
     ProblemList,
@@ -39,10 +38,9 @@ from automax_ros.rackfile.reading.values import (
     wrong_kind,
 )
 from automax_ros.runtime.tasks.task import Task
-from automax_ros.scenario.stimuli.reading import Read, Verb, cut_short, named, time_of, value_for
+from automax_ros.scenario.stimuli.player import Action, WavePlayer
 from automax_ros.scenario.stimuli.signals import RackSignals
-from automax_ros.scenario.stimuli.values import value_verbs
-from automax_ros.scenario.stimuli.wave_player import Action, WavePlayer
+from automax_ros.scenario.stimuli.values import Read, Verb, cut_short, named, time_of, value_for, value_verbs
 
 
 def read_plant_work(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
@@ -324,7 +322,7 @@ def _local(rack: Rack, key: Scalar, findings: ProblemList) -> LocalElement | Non
 
 def _common(rack: Rack, key: Scalar, findings: ProblemList) -> CommonElement | None:
     try:
-        meant = common_named(rack.config, key.text)
+        meant = rack.config.common(key.text)
     except NameFault as fault:
         findings.add("AMX6735", fault.message, key.span, cut_short(key.text) or fault.hint)
         return None

@@ -18,12 +18,11 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.rackfile.reading.values import ProblemList, kind_of, report_twice
 from automax_ros.runtime.tasks.standalone_task import StandaloneTask
+from automax_ros.scenario.stimuli.player import Stimulus
 from automax_ros.scenario.stimuli.rack_verbs import rack_verbs
-from automax_ros.scenario.stimuli.reading import Verb, time_of
 from automax_ros.scenario.stimuli.schema import MOST_ENTRIES, VERB_SCHEMAS
 from automax_ros.scenario.stimuli.signals import LoneSignals
-from automax_ros.scenario.stimuli.values import VALUE_VERBS, value_verbs
-from automax_ros.scenario.stimuli.wave_player import Stimulus
+from automax_ros.scenario.stimuli.values import VALUE_VERBS, Verb, time_of, value_verbs
 
 MOST_BYTES = 2_000_000
 _MOST_NODES = 1_000_000

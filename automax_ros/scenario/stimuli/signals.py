@@ -11,7 +11,6 @@ from automax_ros.core.names import PREDEFINED, NameFault
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
-from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER
 from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 
@@ -59,7 +58,7 @@ class RackSignals:
 
     def find(self, name: str) -> Signal:
         """Return a common, or an element of one; variables that the rack itself writes are refused (2.4.6)."""
-        meant = common_named(self.rack.config, name)
+        meant = self.rack.config.common(name)
         if meant.name in PREDEFINED:
             raise NameFault(f"{meant.name} cannot be written: the rack itself writes it", "leave it out")
         variable = meant.variable

@@ -9,7 +9,7 @@ import pytest
 from system.support import RACKS
 
 from automax_ros.cli.operate.actions import ACTIONS
-from automax_ros.cli.options.rack_name import space_of
+from automax_ros.cli.options.ros import space_of
 from automax_ros.core.user_error import UsageError, UserError
 from automax_ros.rack.operator.requests import VERBS
 

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from automax_ros.cli.operate.actions import ACTIONS, add_actions
+from automax_ros.cli.operate.ctl import Session
 from automax_ros.cli.operate.prompt import run_shell
-from automax_ros.cli.operate.session import Session
 from automax_ros.cli.visible import VisibleOutput
 from automax_ros.core.user_error import UsageError
 from cli.test_visible_output import EVIL, RAW

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from mcap.data_stream import RecordBuilder
 from mcap.records import Message, Schema
 
-from automax_ros.recordings.mcap.chunk_builder import ChunkBuilder, record_bytes
+from automax_ros.recordings.mcap.mcap_output import ChunkBuilder, record_bytes
 
 TIMES = st.sampled_from([0, 1, (1 << 62) - 1, 1 << 62, (1 << 63) - 1, 1 << 63, (1 << 64) - 1]) | st.integers(
     0, (1 << 64) - 1

@@ -15,8 +15,7 @@ from automax_ros.messages.types.messages import Int16, String
 from automax_ros.messages.types.topics import VALUE
 from automax_ros.recordings.mcap.errors import RecordingError
 from automax_ros.recordings.mcap.mcap_output import McapOutput
-from automax_ros.recordings.write.chunk_thread import ChunkThread
-from automax_ros.recordings.write.data_file import DataFile
+from automax_ros.recordings.write.data_file import ChunkThread, DataFile
 from automax_ros.recordings.write.writer import AT_ONCE_BYTES, BagWriter
 
 INT16 = "std_msgs/msg/Int16"

@@ -9,7 +9,7 @@ from system.support import wait_until
 from automax_ros.ros.intake import intake as door_module
 from automax_ros.ros.intake import rcl
 from automax_ros.ros.intake.intake import MOST_A_ROUND, MOST_OF_ONE, MessageIntake
-from automax_ros.ros.intake.raw_messages import MOST_SENDERS, RawMessage, SequenceTracker
+from automax_ros.ros.intake.rcl import MOST_SENDERS, RawMessage, SequenceTracker
 
 
 class Way:

@@ -5,7 +5,7 @@ import time
 
 from system.support import wait_until
 
-from automax_ros.ros.intake.rack_lock import RackLock
+from automax_ros.ros.base.node import RackLock
 
 
 def test_visitor_enters_within_itself():

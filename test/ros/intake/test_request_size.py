@@ -2,7 +2,7 @@
 
 import pytest
 
-from automax_ros.ros.intake.request_size import MOST, OF_A_MESSAGE, OF_A_TEXT, RequestTooLarge, request_size
+from automax_ros.ros.intake.service_requests import MOST, OF_A_MESSAGE, OF_A_TEXT, RequestTooLarge, request_size
 
 
 @pytest.fixture

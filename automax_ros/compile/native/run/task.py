@@ -21,8 +21,7 @@ from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from typing import Any
 
-from automax_ros.compile.base.assembly import Form
-from automax_ros.compile.base.native_source import NOT_KEPT, NativeSource, NotNative
+from automax_ros.compile.base.native_source import NOT_KEPT, Form, NativeSource, NotNative
 from automax_ros.compile.base.scan_io import ScanIo, ScanTooLong, StateValues
 from automax_ros.compile.blocks.coefficients import CoefficientFunction
 from automax_ros.compile.compiler import CompiledTask, Scans

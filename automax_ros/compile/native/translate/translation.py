@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
-from automax_ros.compile.base.assembly import Form, collections_paused
+from automax_ros.compile.base.build import collections_paused
 from automax_ros.compile.base.emitter import variable_name
 from automax_ros.compile.base.layout import Layout, Role, StateField
-from automax_ros.compile.base.native_source import NativeSource, NotNative
+from automax_ros.compile.base.native_source import Form, NativeSource, NotNative
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.native.translate.calls import called
 from automax_ros.compile.native.translate.environment import Environment

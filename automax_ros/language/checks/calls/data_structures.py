@@ -14,9 +14,8 @@ from automax_ros.blocks.declare.rules import STRUCTURE_BYTES
 from automax_ros.core.diagnostics import Note
 from automax_ros.core.types import NAME_LIMIT, DataType, bare_name
 from automax_ros.language.checks.rules.constant_values import literal_of
-from automax_ros.language.checks.rules.context import Context
+from automax_ros.language.checks.rules.context import Context, TaskLayout
 from automax_ros.language.checks.rules.expressions import check_variable
-from automax_ros.language.checks.rules.task_layout import TaskLayout
 from automax_ros.language.program import DataStructure, Symbol
 from automax_ros.language.tree.tree import Argument, Call, Element, Expression, IntegerLiteral, Reference, Scope
 

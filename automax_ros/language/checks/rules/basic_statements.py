@@ -13,10 +13,9 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import quoted
 from automax_ros.core.types import DataType
 from automax_ros.language.checks.rules.constant_values import constant_value
-from automax_ros.language.checks.rules.context import Context
+from automax_ros.language.checks.rules.context import Context, TaskLayout
 from automax_ros.language.checks.rules.expressions import check_expression, check_integer
 from automax_ros.language.checks.rules.statements import assignable, check_written
-from automax_ros.language.checks.rules.task_layout import TaskLayout
 from automax_ros.language.program import OpenedFile
 from automax_ros.language.tree import tree
 from automax_ros.language.tree.task_kind import TaskKind

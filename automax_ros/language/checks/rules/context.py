@@ -6,7 +6,7 @@ A broken line is one that the parser could not read; its content is kept so that
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from automax_ros.blocks.declare.declaration import Block, Platform
@@ -17,7 +17,8 @@ from automax_ros.core.text import Suggester
 from automax_ros.language.program import BoundCall, CommonSpec, DataStructure, OpenedFile, Symbol
 from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
 from automax_ros.language.tree.task_kind import TaskKind
-from automax_ros.language.tree.tree import Data, Event
+from automax_ros.language.tree.tree import Call, Data, Event, Statement
+from automax_ros.language.tree.walk import statements_in_order
 
 _WORD = re.compile(r"[A-Z_][A-Z0-9_]*[%!@$]?")
 _NUMBER = re.compile(r"\s*([0-9]{1,9})(?![0-9])")
@@ -152,3 +153,20 @@ class Context:
         spec = self.commons.get(name) if self.commons is not None else None
         symbol = self.symbols.get(name)
         return spec is not None and spec.is_input and symbol is not None and symbol.scope.value == "COMMON"
+
+
+@dataclass(frozen=True)
+class TaskLayout:
+    """The parts of a task. Without a SCAN_LOOP everything counts as scan, so that it is checked as such."""
+
+    startup: tuple[Statement, ...]
+    scan_loop: Call | None
+    scan: tuple[Statement, ...]
+    scan_loop_line: int | None = None
+
+    def numbered(self) -> Iterator[tuple[Statement, int | None, bool]]:
+        """Yield every statement but SCAN_LOOP with the line number in force, and whether it is after SCAN_LOOP."""
+        for statement, line in statements_in_order(self.startup):
+            yield statement, line, False
+        for statement, line in statements_in_order(self.scan, self.scan_loop_line):
+            yield statement, line, self.scan_loop is not None

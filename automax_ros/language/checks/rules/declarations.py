@@ -24,8 +24,7 @@ from automax_ros.core.types import (
 )
 from automax_ros.core.values import range_text
 from automax_ros.language.checks.rules.constant_values import constant_value, fits, hex_hint, is_constant
-from automax_ros.language.checks.rules.context import Context
-from automax_ros.language.checks.rules.task_layout import TaskLayout
+from automax_ros.language.checks.rules.context import Context, TaskLayout
 from automax_ros.language.program import CommonSpec, Symbol, TuningLimits
 from automax_ros.language.tree.tree import Declaration, Declared, Event, Expression, Scope
 

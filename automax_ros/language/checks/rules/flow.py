@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.language.checks.rules.context import Context
-from automax_ros.language.checks.rules.task_layout import TaskLayout
+from automax_ros.language.checks.rules.context import Context, TaskLayout
 from automax_ros.language.tree import tree
 from automax_ros.language.tree.walk import bodies, jumps_of
 
