@@ -211,7 +211,7 @@ class _Cluster:
         try:
             answers = within(SAME_S, lambda: self._client.run(installation, on_error="return"))
         except TimeoutError:
-            what = f"not every worker of the cluster has told within {SAME_S} s what is installed there"
+            what = f"not every worker of the cluster reported within {SAME_S} s what is installed there"
             hint = "one hangs, or its machine does: end it; what is not there is not asked"
             raise ClusterFault("AMX6858", self._scheduler, what, hint) from None
         for worker, found in answers.items():

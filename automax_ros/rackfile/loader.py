@@ -46,7 +46,7 @@ from automax_ros.rackfile.sections.watch import read_watch
 
 _SLOT = re.compile(r"[0-9]{1,3}\Z")
 SLOTS_SCHEMA: Schema = entries(
-    "What stands in the rack, by slots 0 to 15.",
+    "The modules of the rack, by slots 0 to 15.",
     f"^0*({'|'.join(map(str, range(MAX_SLOT + 1)))})$",
     either(
         "A module.",

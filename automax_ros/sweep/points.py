@@ -55,7 +55,7 @@ def read_varied(rack: Rack, text: str) -> Varied:
     """
     name, equals, given = text.partition("=")
     if not equals or not given.strip():
-        raise UserError(f"{quoted(text)} says no values", _FORM)
+        raise UserError(f"{quoted(text)} contains no values", _FORM)
     variable = variable_named(rack, name.strip())
     if not variable.is_number or ":" not in given:
         return Varied(variable, tuple(dict.fromkeys(variable.accepted(item.strip()) for item in given.split(","))))

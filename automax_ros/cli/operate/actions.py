@@ -265,7 +265,7 @@ def _step(given: argparse.Namespace) -> list[ServiceCall]:
 
 
 def _powered(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", choices=("off", "on", "cycle"), help="cycle: off, and on again by itself")
+    parser.add_argument("what", choices=("off", "on", "cycle"), help="cycle: off, then on again")
     parser.add_argument(
         "--off-for", type=seconds_above_0, default="1", metavar="S", help="cycle: for how long, s (default: 1)"
     )
@@ -300,16 +300,16 @@ ACTIONS: Mapping[str, Action] = {
     "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger"), done_text=message_text),
     "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger"), done_text=message_text),
     "power": Action("switch the power off and on", _power, _powered),
-    "pause": Action("halt the rack: rack time stands still", _one("pause", "std_srvs/Trigger"), done_text=message_text),
+    "pause": Action("halt the rack: rack time is frozen", _one("pause", "std_srvs/Trigger"), done_text=message_text),
     "step": Action(
-        "let a halted rack go on by scans, ticks, or until a rack time at most 1 s later",
+        "continue a halted rack by scans, ticks, or until a rack time at most 1 s later",
         _step,
         _stepped,
         fields_of,
         step_lines,
         acts=True,
     ),
-    "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger"), done_text=message_text),
+    "resume": Action("continue a halted rack", _one("resume", "std_srvs/Trigger"), done_text=message_text),
     "set": Action("write commons once", _each_assignment("set"), _assignments, done_text=value_text),
     "press": Action("hold BOOLEANs at TRUE for a while", _press_calls, add_press_arguments, mode=Mode.PRESS),
     "get": Action(
@@ -350,13 +350,13 @@ ACTIONS: Mapping[str, Action] = {
         error_lines,
     ),
     "tasks": Action(
-        "how the tasks stand",
+        "the state of the tasks",
         _one("tasks", "automax_msgs/ReadTasks"),
         read=lambda answer: [fields_of(item) for item in answer.tasks],
         lines=task_lines,
     ),
     "status": Action(
-        "how the rack stands, and what stopped it",
+        "the state of the rack, and what stopped it",
         _one("status", "automax_msgs/ReadStatus"),
         read=fields_of,
         lines=status_lines,

@@ -66,7 +66,7 @@ def status_lines(data: Any) -> Iterable[str]:
     runs = f"{data['running']} run{ended}" if ended else f"{data['running']} of {count_of(data['tasks'], 'task')} run"
     yield f"rack {data['rack']}: {data['time_s']:.3f} s, {runs}{power}"
     if data["halted"]:
-        yield "halted: rack time stands still"
+        yield "halted: rack time is frozen"
     if data["stopped"]:
         code = f" (code {data['stopped_code']})" if data["stopped_code"] else ""
         yield f"stopped at {data['stopped_at_s']:.3f} s{code}: {data['stopped_reason']}"

@@ -30,9 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax step``."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="the rack's YAML file")
     add_set_argument(parser)
-    parser.add_argument(
-        "--stimuli", type=Path, metavar="FILE", help="let happen what this YAML file says, by rack time"
-    )
+    parser.add_argument("--stimuli", type=Path, metavar="FILE", help="play this stimuli file, by rack time")
     parser.add_argument(
         "--ideal",
         action="store_true",

@@ -99,7 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration", type=seconds_above_0, default=USUAL_DURATION_NS, metavar="S", help="of a run (default: 10)"
     )
     parser.add_argument(
-        "--stimuli", type=Path, metavar="FILE", help="let happen in each run what this YAML file says (docs/stimuli.md)"
+        "--stimuli", type=Path, metavar="FILE", help="play this stimuli file in each run (docs/stimuli.md)"
     )
     parser.add_argument(
         "--output",

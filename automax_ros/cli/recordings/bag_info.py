@@ -144,7 +144,7 @@ def _verdict(content: Mapping[str, Any]) -> list[str]:
     return [*lines, *(f"  hint: {hint}" for hint in hints if hint)]
 
 
-_GAPS = "  a replay goes on from the next image of memory and the next state of each task"
+_GAPS = "  a replay continues from the next image of memory and the next state of each task"
 
 
 def _section(title: str, rows: Sequence[Sequence[str]]) -> list[str]:

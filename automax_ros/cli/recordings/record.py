@@ -52,9 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", "-o", type=Path, metavar="DIR", help="the new rosbag2 folder (default: rack and time)"
     )
-    parser.add_argument(
-        "--duration", type=seconds_above_0, metavar="S", help="seconds after which the recording ends by itself"
-    )
+    parser.add_argument("--duration", type=seconds_above_0, metavar="S", help="seconds after which the recording ends")
     parser.add_argument("--tasks", metavar="A,B", help="record scans and states of these tasks only (default: all)")
     parser.add_argument(
         "--split-mb", metavar="MB", help="begin a new file when one reaches MB megabytes (1 MB is 10^6 bytes)"
@@ -151,7 +149,9 @@ class _Session:
         except CdrError as error:
             raise UsageError(f"{self._space}/variables is not a rack's table: {error}") from error
         if not self._recorder.binding.knows_senders:
-            self._line.message("warning: this ROS 2 does not tell who sends: what others publish is recorded too")
+            self._line.message(
+                "warning: this ROS 2 does not identify senders: messages of other programs are recorded too"
+            )
         if table is not None or self._stop.requested:
             return table
         there = self._recorder.racks()

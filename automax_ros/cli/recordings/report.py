@@ -1,4 +1,4 @@
-"""Report a run from a recording: one HTML page that is whole by itself, and a picture.
+"""Report a run from a recording: one self-contained HTML page, and a picture.
 
 Of every drive of the rack, or of the one whose current minor loop is in a task: speed, current reference and feedback,
 DELTA, bridge, faults and errors with their times, rms current and energies, and what happened in which order. Of a rack

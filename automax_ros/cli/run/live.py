@@ -206,8 +206,8 @@ def _time(plan: RunPlan) -> str:
     """Return which clock the rack follows, on a separate line; empty for the wall clock."""
     if plan.simulated is not None:
         rate = plan.simulated.rate
-        pace = "as fast as it goes" if rate is None else f"{rate:g} times the wall clock"
-        return f"\nrack time is simulated, {pace}, and told on /clock"
+        pace = "as fast as possible" if rate is None else f"{rate:g} times the wall clock"
+        return f"\nrack time is simulated, {pace}, and published on /clock"
     if follows_clock(plan.ros, plan.config.namespace):
         return "\nrack time follows /clock, and begins with its first message"
     return ""

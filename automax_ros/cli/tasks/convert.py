@@ -74,7 +74,7 @@ def _places(files: list[Path], folder: Path | None) -> dict[Path, Path]:
     for path in files:
         place = folder / path.name
         if place in places.values():
-            raise UsageError(f"two files are named {path.name}", "convert them into folders of their own")
+            raise UsageError(f"two files are named {path.name}", "convert them into separate folders")
         if place.exists() or place.is_symlink():
             raise UsageError(f"{place} exists already", "name another folder, or remove the file")
         places[path] = place

@@ -172,7 +172,7 @@ def run(arguments: argparse.Namespace) -> int:
     program = None
     if arguments.file is not None:
         if arguments.ticks is not None:
-            raise UsageError("--ticks and FILE both tell the scan time", "give one of them")
+            raise UsageError("--ticks and FILE both give the scan time", "give one of them")
         program = checked_program(arguments)
         if program is None:
             return 1

@@ -107,7 +107,7 @@ def check(
     try:
         layout = _check_module(context, module)
     except TooManyProblemsError:
-        message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not looked at"
+        message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not checked"
         context.diagnostics.append(Diagnostic(_TOO_MANY, message, context.diagnostics[-1].span, context.line))
     diagnostics = in_order(context.diagnostics)
     unconfirmed = find_unconfirmed(module, context.kind)

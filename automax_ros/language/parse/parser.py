@@ -187,7 +187,7 @@ class StatementReader:
     def _refuse_behind_then(self, cursor: Cursor) -> None:
         word = cursor.current.text
         if word in _BLOCK_WORDS and cursor.following.text != "=":
-            hint = "put nothing after THEN and the statements on lines of their own, closed by END_IF"
+            hint = "put nothing after THEN and the statements on separate lines, closed by END_IF"
             cursor.fail("AMX0060", f"{word} cannot stand after THEN on one line", hint)
         refuse_word(cursor, self._kind)
 

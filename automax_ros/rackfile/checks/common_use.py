@@ -62,7 +62,7 @@ def writer_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict
                 message = (
                     f"{name} is written here, and in line {first.line} of {files[first.task]} by task {first.task}"
                 )
-                hint = "whoever writes last wins: let one task write it, or give each a common of its own"
+                hint = "the last writer wins: use one task to write it, or give each its own common"
                 diagnostic = Diagnostic("AMX6495", message, second.target.span, second.line, hint)
                 found.setdefault(task.name, []).append(diagnostic)
             written.setdefault(name, []).extend(writes)
@@ -93,7 +93,7 @@ def _unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[
         if read is not None and variable.name not in written and variable.point is None:
             zero = {"BOOLEAN": "FALSE", "STRING": "empty"}.get(variable.type.word, "0")
             place = f"line {read[1]} of {read[0]}"
-            message = f"{variable.name} is read in {place}, and nobody writes it: it stays {zero}"
+            message = f"{variable.name} is read in {place}, and no task writes it: it stays {zero}"
             hint = "let a task write it; or write ros: in for what comes from outside, or a preset"
             yield Diagnostic("AMX6496", message, _place(config, variable.line), hint=hint)
 

@@ -149,7 +149,7 @@ class Damage:
         self._resumed += 1
         start = size if self._resumed > _MAX_RESUMED else _next_chunk(file, position + 1, size)
         end = "the end" if start == size else f"byte {start}"
-        self.lose(start - position, f"no whole record stands from byte {position} to {end}")
+        self.lose(start - position, f"no complete record from byte {position} to {end}")
         return start
 
 

@@ -47,7 +47,7 @@ def checked_table(table: VariableTable) -> dict[str, Variable]:
         if not _NAME.fullmatch(entry.name):
             raise ValueError(f"variable {entry.id} is named {entry.name[:80]!r}")
         if entry.name in by_name:
-            raise ValueError(f"variable {entry.name} stands in it twice")
+            raise ValueError(f"variable {entry.name} is listed twice")
         DataType.numbered(entry.type)
         by_name[entry.name] = entry
     if len({entry.id for entry in by_name.values()}) < len(by_name):
@@ -309,4 +309,4 @@ def variables_of(bag: Path, table: VariableTable) -> dict[str, Variable]:
         raise BagError("AMX6813", bag, f"the table of variables is wrong: {error}", _WRONG_TABLE_HINT) from error
 
 
-_WRONG_TABLE_HINT = "no rack has sent it so; what it numbers cannot be told apart"
+_WRONG_TABLE_HINT = "no rack has sent it so; its ids are ambiguous"

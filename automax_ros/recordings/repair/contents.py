@@ -74,12 +74,12 @@ class FileSequence:
     def fault(self, log_time: int, type_name: str, payload: bytes) -> str:
         """Return why a message does not follow those before it; empty if it does, and then the next must follow it."""
         if log_time <= self._last_log:
-            return "log times that go backwards" if log_time < self._last_log else "log times that stand twice"
+            return "log times that go backwards" if log_time < self._last_log else "log times that are repeated"
         if type_name == WRITE:
             with contextlib.suppress(CdrError):
                 head = write_head(payload)
                 if head.sequence <= self._writes.get(head.run_id, -1):
-                    return "numbers of writes that go backwards or stand twice"
+                    return "numbers of writes that go backwards or are repeated"
                 if head.run_id in self._writes or len(self._writes) < _MOST_RUNS:
                     self._writes[head.run_id] = head.sequence
         self._last_log = log_time

@@ -79,7 +79,7 @@ class ReplaySource:
         if before == after or not before or not after:
             return []
         periods = f"its scan period was {before / 1e6:g} ms and is {after / 1e6:g} ms now"
-        return [f"{periods}; it is executed at the recorded scans all the same"]
+        return [f"{periods}; it is executed at the recorded scans nevertheless"]
 
     @property
     def written_at(self) -> Mapping[str, tuple[int, ...]]:
@@ -227,7 +227,7 @@ def unknown_value(bag: Path, source: ReplaySource, variable: CommonVariable, whe
     return BagError(
         "AMX6833",
         bag,
-        f"does not tell {variable.name} before {when} s; task {source.name} reads it ({place})",
+        f"does not contain {variable.name} before {when} s; task {source.name} reads it ({place})",
         "record with `automax`, or with the topics /<rack>/backplane and /<rack>/backplane/snapshot",
     )
 

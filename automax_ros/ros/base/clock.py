@@ -100,7 +100,7 @@ class RackClock:
             message = decode(_TYPE, payload or b"")
             assert isinstance(message, Clock)
             if not 0 <= message.clock < _LATEST_NS:
-                raise CdrError(f"{message.clock} ns is not a time that a clock tells")
+                raise CdrError(f"{message.clock} ns is not a valid clock time")
             self._follow(message.clock)
         except CdrError as error:
             text = f"{CLOCK}: {error}"

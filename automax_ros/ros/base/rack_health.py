@@ -61,7 +61,7 @@ class RackHealth:
         if not operations.powered:
             return DiagnosticStatus.WARN, "the power is off"
         if is_halted(self._rack_context.pacer):
-            return DiagnosticStatus.WARN, "halted: rack time stands still"
+            return DiagnosticStatus.WARN, "halted: rack time is frozen"
         if cause is not None:
             return DiagnosticStatus.WARN, f"{cause.title}: {cause.reason}"
         if newly_skipped:

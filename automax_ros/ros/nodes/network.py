@@ -143,7 +143,7 @@ def _read(payload: bytes) -> tuple[Sender, DropMessage] | None:
 def _sentence(status: NetworkStatus) -> str:
     if status.lost:
         return f"code {status.code}: nothing comes from drops {_listed(status.lost)}"
-    return f"hears drops {_listed(status.heard)}" if status.heard else "hears nobody yet"
+    return f"receives from drops {_listed(status.heard)}" if status.heard else "receives from no drop yet"
 
 
 def _listed(drops: Sequence[int]) -> str:

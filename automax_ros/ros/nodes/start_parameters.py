@@ -65,7 +65,7 @@ def without_use(arguments: RosArguments, config: RackConfig, declared: Mapping[s
         elif not reached - {MAIN_NODE} - set(declared):
             found[item.key, item.name] = _without_name(item, reached, declared)
     texts = [text for text in found.values() if text]
-    more = [f"{len(texts) - MOST_TOLD} more parameters reach nobody"] if texts[MOST_TOLD:] else []
+    more = [f"{len(texts) - MOST_TOLD} more parameters match no node"] if texts[MOST_TOLD:] else []
     return [*texts[:MOST_TOLD], *more]
 
 
