@@ -3,7 +3,7 @@
 The Python files are the reference and always exist. Machine code made from them (by mypyc, `make setup`) is in a folder
 ``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter; no other
 place is searched. A group of modules is used only if every source that it was made from, and every source that its
-types came from, still has the same content (decision): whoever edits a file runs what was edited. If libraries are
+types came from, still has the same content (decision): a file that was edited runs as it is. If libraries are
 missing, cannot be loaded on this machine, or call another module's C in a version that is not there, the Python files
 run too; ``automax --version`` says why. ``AUTOMAX_COMPILED=off`` in the environment switches all of it off.
 """
@@ -214,8 +214,8 @@ def _differing(module: str, binary: int, offered: int) -> str:
         pointer = ctypes.pythonapi.PyCapsule_GetPointer
         pointer.restype, pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
         table = ctypes.cast(pointer(capsule, f"{module}._C_API".encode()), ctypes.POINTER(ctypes.c_void_p))
-        tell = ctypes.CFUNCTYPE(ctypes.c_int)
-        found, offers = tell(table[0])(), tell(table[1])()
+        version_getter = ctypes.CFUNCTYPE(ctypes.c_int)
+        found, offers = version_getter(table[0])(), version_getter(table[1])()
     except (ImportError, AttributeError, ValueError, TypeError) as error:
         return f"the C interface of {module} cannot be read: {error}"
     if found == binary and offers >= offered:

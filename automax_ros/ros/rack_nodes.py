@@ -51,7 +51,7 @@ from automax_ros.ros.base.node import SIM_TIME, ModuleNode, RackContext, follows
 from automax_ros.ros.distributed.bus import DistributedMemory, ProcessLayout
 from automax_ros.ros.distributed.forwarding import RequestForwarder, operate_name
 from automax_ros.ros.distributed.presence import PresencePublisher
-from automax_ros.ros.intake.guard import MOST_TOLD
+from automax_ros.ros.intake.guard import MOST_SHOWN
 from automax_ros.ros.intake.intake import MessageIntake
 from automax_ros.ros.intake.rack_lock import RackLock
 from automax_ros.ros.nodes.common_memory import CommonMemoryNode
@@ -401,7 +401,7 @@ class RackNodes:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
-            if self._context.ok():  # else ROS was shut down, and a report reaches nobody
+            if self._context.ok():  # else ROS was shut down, and a report reaches no subscriber
                 self._report(f"rack {self.rack.config.name} has ended", error)
 
     def _report(self, what: str, error: Exception) -> None:
@@ -463,7 +463,7 @@ class LiveRack:
                 self.nodes.add_to(self._executor)
         except RCLError as error:
             self._leave()
-            text = str(error).split(", at /", 1)[0][:MOST_TOLD]
+            text = str(error).split(", at /", 1)[0][:MOST_SHOWN]
             hint = "do not give two of its topics or services one name (-r FROM:=TO)" if arguments.given else None
             raise RosUnavailable(f"the rack's nodes cannot be made: {text}", hint) from error
         except Exception:

@@ -277,8 +277,8 @@ def _task(info: BagInfo, name: str, facts: TaskFacts | None) -> dict[str, Any]:
 
 def _operation(info: BagInfo, item: Operation) -> dict[str, Any]:
     start = info.table.stamp if info.table else 0
-    told = {"at": (item.stamp - start) / NS_PER_S, "what": item.what, "task": item.task, "ok": item.ok}
-    return {**told, "reason": item.reason, "detail": item.detail}
+    fields = {"at": (item.stamp - start) / NS_PER_S, "what": item.what, "task": item.task, "ok": item.ok}
+    return {**fields, "reason": item.reason, "detail": item.detail}
 
 
 def _variables(info: BagInfo) -> dict[str, Any]:

@@ -30,7 +30,7 @@ from automax_ros.runtime.health import Health
 
 _LOOK_S = 0.05
 """Longest wait while no rack runs."""
-_MOST_TOLD = 100
+_MOST_SHOWN = 100
 """Most findings of a file that are logged."""
 _FAULTS = (RackError, StimuliRefused, BagError, UserError)
 """Errors that keep a rack from being configured and that the user can correct."""
@@ -108,7 +108,7 @@ class LifecycleRunner:
     # Duties
 
     def refusal(self, transition: str) -> str | None:
-        """Without an operator only a rack that was never active may be managed (decision: somebody must start it).
+        """Without an operator only a rack that was never active may be managed (decision: else nothing could start it).
 
         A distributed rack is configured and ended by starting and ending its processes (decision).
         """
@@ -126,7 +126,7 @@ class LifecycleRunner:
         except WorkInterrupted as cut:
             raise TransitionRefused("the program ends") from cut
         except _FAULTS as fault:
-            self._tell(fault)
+            self._report_fault(fault)
             raise TransitionRefused(str(fault) or "the stimuli have errors") from fault
 
     def activate(self) -> Pending | None:
@@ -196,12 +196,12 @@ class LifecycleRunner:
         except OperationRefused as refused:
             raise TransitionRefused(str(refused)) from refused
 
-    def _tell(self, fault: Exception) -> None:
+    def _report_fault(self, fault: Exception) -> None:
         """Log why the rack cannot be configured; at an autostart the command prints it as it ends."""
         if not self._is_starting:
             _print_fault(fault)
         found = [(item, where) for where, items in getattr(fault, "findings", ()) for item in items]
-        for item, where in found[:_MOST_TOLD]:
+        for item, where in found[:_MOST_SHOWN]:
             self._node.get_logger().error(render(item, where))
 
 

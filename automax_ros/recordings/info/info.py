@@ -118,8 +118,8 @@ class BagInfo(Tally):
     @property
     def gap_texts(self) -> list[str]:
         """Gaps that do not make the recording unsound, from its recorder's data, its write log and its scans."""
-        told = self.custom_data.get("gaps", "")
-        found = [f"the recorder says: {told}"] if told else []
+        recorded = self.custom_data.get("gaps", "")
+        found = [f"the recorder says: {recorded}"] if recorded else []
         scans = [f"{count_of(task.missing, 'scan')} of {name}" for name, task in self.tasks.items() if task.missing]
         return [*found, *self.gaps, *(f"{text} not there" for text in scans)]
 

@@ -137,7 +137,7 @@ class BagReader:
         information = self._information
         if information is None:
             try:
-                information = next(filter(None, map(told_information, self.metadata_records())), {})
+                information = next(filter(None, map(recorded_information, self.metadata_records())), {})
             except BagError:  # raised again when the messages are read
                 information = {}
         return custom_data_of(information)
@@ -356,7 +356,7 @@ def read_information(folder: Path) -> dict[str, Any]:
     return information
 
 
-def told_information(record: Metadata) -> dict[str, Any] | None:
+def recorded_information(record: Metadata) -> dict[str, Any] | None:
     """Return a data file's copy of metadata.yaml; None if the record is another one or cannot be read."""
     text = record.metadata.get("serialized_metadata", "") if record.name == "rosbag2" else ""
     if not text or len(text) > MAX_METADATA_BYTES:

@@ -148,10 +148,10 @@ class Series:
         values, instant = self._values, self.origin_ns
         for entry in self._messages:
             message = entry.message
-            told: Iterable[tuple[int, Cell]] = ()
+            states: Iterable[tuple[int, Cell]] = ()
             entries: Iterable[Entry] | None = ()
             if isinstance(message, (TaskState, PlantState)):
-                told = self._states.values(message)
+                states = self._states.values(message)
             elif isinstance(message, (CommonImage, CommonWrite)):
                 entries = self._log.take(message)
                 if self._take_writes is not None and entries and isinstance(message, CommonWrite):
@@ -166,8 +166,8 @@ class Series:
                 if changed:
                     yield max(0, instant - self.origin_ns), changed
                 instant = message.stamp
-            for column, value in told:
-                values.tell(column, value)
+            for column, value in states:
+                values.set_value(column, value)
             values.take(entries)
         changed = values.changes()
         if changed:

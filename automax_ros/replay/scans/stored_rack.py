@@ -186,8 +186,8 @@ class StoredRack:
             (number, item.name, item.type.number, item.dimensions, item.length)
             for number, item in enumerate(self.config.variables)
         ]
-        told = [(item.id, item.name, item.type, tuple(item.dimensions), item.length) for item in table.variables]
-        if told != expected:
+        recorded = [(item.id, item.name, item.type, tuple(item.dimensions), item.length) for item in table.variables]
+        if recorded != expected:
             raise BagError("AMX6831", self.bag, "its table of variables is not that of the rack.yaml stored in it")
 
 

@@ -121,7 +121,7 @@ class RackClock:
             stamp = self._rack_context.stream.stamp(self._follower.now_ns) + self._follower.ahead_ns(clock_ns)
             if stamp >= _LATEST_NS:
                 raise CdrError(f"{clock_ns} ns comes after a clock that went back, and would be a stamp of {stamp} ns")
-            self._follower.heard(clock_ns)
+            self._follower.follow_to(clock_ns)
 
     def _check_publishers(self, own: int) -> None:
         assert self._node is not None

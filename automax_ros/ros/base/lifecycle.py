@@ -16,7 +16,7 @@ from rclpy.lifecycle import LifecycleNodeMixin, TransitionCallbackReturn
 
 from automax_ros.core.text import printable
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.ros.intake.guard import MOST_TOLD, RequestGuard
+from automax_ros.ros.intake.guard import MOST_SHOWN, RequestGuard
 from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred
 
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = "unconfigured", "inactive", "active", "finalized"
@@ -191,7 +191,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         name = _name(request.transition)
         reason = self._duties.refusal(name) if name else "it is not a transition that can be asked for"
         if reason is not None:
-            self._refuse(name or printable(request.transition.label[:MOST_TOLD]), reason)
+            self._refuse(name or printable(request.transition.label[:MOST_SHOWN]), reason)
             return response
 
         def begin(respond: Respond) -> None:
@@ -215,7 +215,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
 
     def _refuse(self, transition: str, reason: str) -> None:
         self.get_logger().warning(f"transition {transition} refused: {reason}")
-        self._guard.refused(transition, reason[:MOST_TOLD], reason[:MOST_TOLD])
+        self._guard.refused(transition, reason[:MOST_SHOWN], reason[:MOST_SHOWN])
 
 
 def _name(transition: Any) -> str:

@@ -395,7 +395,7 @@ class DistributedMemory:
         if wrong and presence.fingerprint == self.peers.fingerprint and presence.process != self.peers.process:
             self._refuse(PRESENCE, wrong)
             return
-        found = self.peers.heard(presence, time.monotonic_ns())
+        found = self.peers.receive(presence, time.monotonic_ns())
         if found is PresenceVerdict.OWN:
             return
         if found not in (PresenceVerdict.KNOWN, PresenceVerdict.NEW):

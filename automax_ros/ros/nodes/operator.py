@@ -83,7 +83,7 @@ class Reloading:
             self._reloads.refuse(task, reason)
 
 
-MOST_TOLD = 300
+MOST_SHOWN = 300
 """Most characters of an unforeseen error in a response."""
 
 
@@ -146,7 +146,7 @@ class OperatorServices:
         """Return a response with the outcome of the request, and what is true now."""
         reason = "" if error is None else str(error)
         if error is not None and not isinstance(error, OperationRefused):
-            reason = f"{type(error).__name__}: {reason[:MOST_TOLD]}"
+            reason = f"{type(error).__name__}: {reason[:MOST_SHOWN]}"
             self._node.guard.report(f"a request to {name} was refused", error)
         elif error is not None:
             self._node.guard.refused(name, reason, name)
