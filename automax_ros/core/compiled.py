@@ -44,8 +44,8 @@ class CompiledGroup:
     def fresh(self, package: str) -> bool:
         """Return whether the sources below the folder ``package`` are those that were compiled; checked once."""
         if self.stale is None:
-            harmed = (_harmed(file, size) for file, size in self.sizes.items())
-            changed = (_changed(package, file, digest) for file, digest in self.sources.items())
+            harmed = (_explain_damage(file, size) for file, size in self.sizes.items())
+            changed = (_explain_change(package, file, digest) for file, digest in self.sources.items())
             others = (_differing(module, *version) for module, version in self.interfaces.items())
             self.stale = next((why for reasons in (harmed, changed, others) for why in reasons if why), "")
         return not self.stale
@@ -188,7 +188,7 @@ def _folders(package: str) -> tuple[str, ...]:
     )
 
 
-def _harmed(file: str, size: int) -> str:
+def _explain_damage(file: str, size: int) -> str:
     try:
         found = os.path.getsize(file)
     except OSError:
@@ -196,7 +196,7 @@ def _harmed(file: str, size: int) -> str:
     return "" if found == size else f"{file} has {found} bytes of {size}"
 
 
-def _changed(package: str, file: str, digest: str) -> str:
+def _explain_change(package: str, file: str, digest: str) -> str:
     try:
         with open(os.path.join(package, file), "rb") as source:
             content = source.read()

@@ -120,7 +120,7 @@ def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
     path = Path(path)
     findings = ProblemList()
     source = SourceText(str(path), _text_of(path, findings))
-    return _loaded(source, TaskReader(path, allow_outside, findings), path, findings)
+    return _make_result(source, TaskReader(path, allow_outside, findings), path, findings)
 
 
 def load_stored(source: SourceText, path: Path) -> LoadResult:
@@ -129,10 +129,10 @@ def load_stored(source: SourceText, path: Path) -> LoadResult:
     ``path`` is the file's path in the configuration. No file is read.
     """
     findings = ProblemList()
-    return _loaded(source, TaskReader(None, False, findings), path, findings)
+    return _make_result(source, TaskReader(None, False, findings), path, findings)
 
 
-def _loaded(source: SourceText, tasks: TaskReader, path: Path, findings: ProblemList) -> LoadResult:
+def _make_result(source: SourceText, tasks: TaskReader, path: Path, findings: ProblemList) -> LoadResult:
     root = read_yaml(source.text, findings.yaml_flaw) if not findings.errors else None
     config = _read_rack(root, source.text, tasks, path, findings) if root is not None else None
     return LoadResult(config if not findings.errors else None, findings.in_order(), source)

@@ -76,7 +76,7 @@ class SlotReader:
         if slot not in self._places:
             return slot
         first = self._places[slot]
-        held = f"holds {_described(self._placed[slot])}" if slot in self._placed else "is defined"
+        held = f"holds {_describe(self._placed[slot])}" if slot in self._placed else "is defined"
         message = f"slot {slot} already {held} (line {first.line})"
         self._findings.add("AMX6201", message, key.span, notes=(Note("first defined here", first),))
         return None
@@ -93,7 +93,7 @@ class SlotReader:
             return None
         kind = SUPPORTED[model]
         placed = self._placed[slot] = PlacedModule(slot, model, kind, key.span)
-        known, what = ("module", *kind.options), _described(placed)
+        known, what = ("module", *kind.options), _describe(placed)
         section = Section(node.entries, what, known, self._findings, owner=f"{what} in slot {slot}")
         return kind.read(ModuleSection(slot, model, section, key.span, self._tasks, self._executive, self._plants))
 
@@ -120,5 +120,5 @@ class SlotReader:
         return None
 
 
-def _described(placed: PlacedModule) -> str:
+def _describe(placed: PlacedModule) -> str:
     return f"{placed.kind.word} {placed.model}"

@@ -146,7 +146,7 @@ class RackNodes:
             arguments = split_arguments(sys.argv)[1]
         if simulated is not None:  # a rack that publishes /clock does not follow it
             arguments = arguments.without(SIM_TIME)
-        self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack), arguments)
+        self.rack = rack if isinstance(rack, Rack) else _load_rack(Path(rack), arguments)
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
         self.stream = RackStream(self.rack, run_id)
         self.health = Health() if manager is None else manager.health
@@ -256,7 +256,7 @@ class RackNodes:
                 self._start_together(self.bus, beginning)
             if self.rack.part.holds_common_memory:
                 self.nodes[0].declare_facts(run_facts(self.stream.run_id))
-            for node in (*self._own, *self._managed()):
+            for node in (*self._own, *self._managed_nodes()):
                 node.follow(ACTIVE)
 
     @property
@@ -385,7 +385,7 @@ class RackNodes:
         """Close."""
         self.close()
 
-    def _managed(self) -> list[ManagedModuleNode]:
+    def _managed_nodes(self) -> list[ManagedModuleNode]:
         return [node for node in self.nodes if isinstance(node, ManagedModuleNode)]
 
     def _enter(self, action: Callable[[], None]) -> None:
@@ -408,7 +408,7 @@ class RackNodes:
         self.nodes[0].guard.report(what, error)
 
 
-def _loaded(path: Path, arguments: RosArguments) -> Rack:
+def _load_rack(path: Path, arguments: RosArguments) -> Rack:
     result = load(path)
     if result.config is None:
         raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])

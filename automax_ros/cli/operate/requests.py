@@ -31,7 +31,7 @@ class Mode(Enum):
     PRESS = "press"
 
 
-def _done(_: ServiceCall, __: Any) -> str:
+def _done_text(_: ServiceCall, __: Any) -> str:
     return "done"
 
 
@@ -49,7 +49,7 @@ class Action:
     add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
     read: Callable[[Any], Any] | None = None
     lines: Callable[[Any], Iterable[str]] = lambda _: ()
-    done_text: Callable[[ServiceCall, Any], str] = _done
+    done_text: Callable[[ServiceCall, Any], str] = _done_text
     mode: Mode = Mode.ONCE
     by_operator: bool = True
     acts: bool = False

@@ -126,7 +126,7 @@ class Session:
 
     def values(self) -> dict[str, Value]:
         """Return the values of the watched variables, or of all simple ones if none is watched."""
-        shown = self._watched.values() or self._all()
+        shown = self._watched.values() or self._simple_variables()
         return {variable.label: variable.read() for variable in shown}
 
     def watch(self, words: list[str]) -> None:
@@ -249,7 +249,7 @@ class Session:
         """End the session."""
         self.over = True
 
-    def _all(self) -> Iterator[Variable]:
+    def _simple_variables(self) -> Iterator[Variable]:
         """Yield the simple commons, and the locals of the held task, or of all tasks if none is held."""
         rack, (task, _) = self.stepper.rack, self.stepper.place
         for variable in rack.config.declared:

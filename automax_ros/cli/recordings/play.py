@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         if found is None:
             return 0
         _choose(found, arguments.topics)
-        renaming = Renaming(found.spaces, target or _placed(found.spaces, ros))
+        renaming = Renaming(found.spaces, target or _target_namespace(found.spaces, ros))
         return _play(found, renaming, rate, arguments, stop, domain)
 
 
@@ -208,7 +208,7 @@ def _rate(text: str) -> float:
     return rate
 
 
-def _placed(spaces: Collection[str], ros: RosArguments) -> str | None:
+def _target_namespace(spaces: Collection[str], ros: RosArguments) -> str | None:
     """Return the namespace to play into if ROS arguments give one: in it, under the rack's own name (decision)."""
     if not ros.namespace:
         return None

@@ -73,7 +73,7 @@ def _posts(plan: RunPlan, processes: Sequence[RackProcess], arguments: argparse.
         own = ["--state", str(plan.state / process.name)] if plan.state is not None else []
         own += ["--await-recorder"] if plan.record is not None else []
         own += (
-            _given("--set", arguments.settings) + _given("--watch", arguments.watch)
+            _option_words("--set", arguments.settings) + _option_words("--watch", arguments.watch)
             if process.holds_common_memory
             else []
         )
@@ -105,7 +105,7 @@ def _ros(plan: RunPlan, arguments: argparse.Namespace) -> list[str]:
     return [*discovery, *plan.ros.command_line]
 
 
-def _given(option: str, values: Sequence[str] | None) -> list[str]:
+def _option_words(option: str, values: Sequence[str] | None) -> list[str]:
     return [f"{option}={value}" for value in values or ()]
 
 

@@ -77,7 +77,7 @@ class LifecycleRunner:
         self._is_starting = True
         for transition in (CONFIGURE, ACTIVATE):
             if not self._stop.requested:
-                self._node.change(transition, self._started)
+                self._node.change(transition, self._raise_start_error)
         self._is_starting = False
 
     def run(self) -> None:
@@ -131,7 +131,7 @@ class LifecycleRunner:
 
     def activate(self) -> Pending | None:
         """Start the rack, or put all of its tasks into RUN again."""
-        session = self._expected()
+        session = self._expect_session()
         if session.has_begun:
             return self._operate(session.live.nodes.activate)
         self._start(session)
@@ -140,7 +140,7 @@ class LifecycleRunner:
 
     def deactivate(self) -> None:
         """STOP ALL."""
-        self._operate(self._expected().live.nodes.deactivate)
+        self._operate(self._expect_session().live.nodes.deactivate)
 
     def cleanup(self) -> None:
         """Remove the nodes of the modules from the graph; save non-volatile values and finish the recording."""
@@ -162,7 +162,7 @@ class LifecycleRunner:
         if plan.config.namespace != self._managed.namespace:
             now, before = plan.config.namespace, self._managed.namespace
             raise RackError(f"the rack is called {now} now, this is the node of {before}: start the program again")
-        plan = replace(plan, record=_numbered(plan.record, self._sessions + 1))
+        plan = replace(plan, record=_numbered_folder(plan.record, self._sessions + 1))
         self._session = LiveSession(plan, self._process, self._node, self._stop, self._domain)
         self._sessions += 1
 
@@ -181,12 +181,12 @@ class LifecycleRunner:
     def _is_wanted(self) -> bool:
         return self._stop.requested or self._ended or bool(self._asked)
 
-    def _started(self, error: Exception | None) -> None:
+    def _raise_start_error(self, error: Exception | None) -> None:
         """Raise the error that prevented the autostart, unless a signal caused it."""
         if error is not None and not self._stop.requested:
             raise error.__cause__ or error
 
-    def _expected(self) -> LiveSession:
+    def _expect_session(self) -> LiveSession:
         assert self._session is not None, "only a configured node has this transition"
         return self._session
 
@@ -212,7 +212,7 @@ def _print_fault(fault: Exception) -> None:
         print(f"automax run: {fault}", file=sys.stderr, flush=True)
 
 
-def _numbered(folder: Path | None, number: int) -> Path | None:
+def _numbered_folder(folder: Path | None, number: int) -> Path | None:
     """Return the folder in which the nth run of a program is recorded: DIR, DIR_2, DIR_3 (decision)."""
     if folder is None or number == 1:
         return folder

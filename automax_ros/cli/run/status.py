@@ -212,10 +212,12 @@ class StatusDisplay:
         return dict(self._health.counts) if self._health else errors
 
     def _values(self) -> tuple[str, ...]:
-        return tuple(f"{item.label}={_shown(item, self._rack.value(item.name, item.index))}" for item in self._watch)
+        return tuple(
+            f"{item.label}={_shown_value(item, self._rack.value(item.name, item.index))}" for item in self._watch
+        )
 
 
-def _shown(item: CommonElement, value: Value) -> str:
+def _shown_value(item: CommonElement, value: Value) -> str:
     """Return a value as the rack file declares it: scaled, with its unit; the unit `counts` is not shown."""
     variable = item.variable
     text = value_text(value)

@@ -96,7 +96,7 @@ class Peers:
 
     def receive(self, presence: Presence, now_ns: int) -> PresenceVerdict:
         """Process a presence."""
-        refused = self._refused(presence)
+        refused = self._refusal(presence)
         if refused is not None:
             return refused
         if presence.run_id and not self.run_id:
@@ -128,7 +128,7 @@ class Peers:
         peer = self.by_slot.get(presence.seat)
         return peer if peer is not None and peer.presence is presence and presence.sequence > peer.received else None
 
-    def _refused(self, presence: Presence) -> PresenceVerdict | None:
+    def _refusal(self, presence: Presence) -> PresenceVerdict | None:
         if presence.process == self.process:
             return PresenceVerdict.OWN
         if presence.run_id and self.run_id and presence.run_id != self.run_id:

@@ -177,7 +177,7 @@ class CommonLog:
         Raises:
             BagError: they do not fit the table of variables.
         """
-        return self._typed(values, stamp, self._read_kinds)
+        return self._typed_entries(values, stamp, self._read_kinds)
 
     def entries(self, values: Values, stamp: int) -> list[Entry]:
         """Return the entries of a message, each in its variable's own type.
@@ -185,9 +185,9 @@ class CommonLog:
         Raises:
             BagError: they do not fit the table of variables.
         """
-        return self._typed(values, stamp, self._kinds)
+        return self._typed_entries(values, stamp, self._kinds)
 
-    def _typed(self, values: Values, stamp: int, kinds: Mapping[int, _Kind]) -> list[Entry]:
+    def _typed_entries(self, values: Values, stamp: int, kinds: Mapping[int, _Kind]) -> list[Entry]:
         if not values.variable:
             return []
         texts = iter(values.text)

@@ -104,7 +104,7 @@ def repair(
     found: dict[Path, FileReport] = {}
     sequence = FileSequence() if _is_ours(bag, paths) else None
     for path in paths if sequence is None else sorted(paths, key=_first_log):
-        found[path] = _examined(path, provenance, sequence)
+        found[path] = _examine(path, provenance, sequence)
         on_progress(len(found) / len(paths) / 2)
     report.files += [found[path] for path in paths]
     _check_metadata(bag, report, provenance)
@@ -166,12 +166,12 @@ def _data_files(bag: Path, report: RepairReport) -> list[Path]:
     except BagError:
         listed = None
     names = [path.name for path in found]
-    wanted = [str(name)[:80] for name in listed[:MAX_FILES]] if isinstance(listed, list) else _numbered(found)
+    wanted = [str(name)[:80] for name in listed[:MAX_FILES]] if isinstance(listed, list) else _missing_numbers(found)
     report.problems += [f"{name} is missing" for name in wanted if name not in names][:_MISSING_SHOWN]
     return found
 
 
-def _numbered(found: list[Path]) -> list[str]:
+def _missing_numbers(found: list[Path]) -> list[str]:
     """Return the names that are missing in the numbering of a recording's files, up to the last one found."""
     stem, last, _ = file_place(found[-1])
     numbers = {file_place(path)[1] for path in found if file_place(path)[0] == stem}
@@ -200,7 +200,7 @@ def _first_log(path: Path) -> int:
         return 0
 
 
-def _examined(path: Path, provenance: Provenance, sequence: FileSequence | None) -> FileReport:
+def _examine(path: Path, provenance: Provenance, sequence: FileSequence | None) -> FileReport:
     """Read a file to its end and report its damage; a damaged one is rewritten later."""
     file = McapFile(path)
     contents = FileContents(path.name, channels=file.channels, schemas=file.schemas)
@@ -289,7 +289,7 @@ def _write(
             "AMX6800", target, "exists already, not overwriting", "name another folder with --output"
         ) from None
     except OSError as error:
-        raise _refused(target, error) from error
+        raise _write_error(target, error) from error
     try:
         for number, (path, file) in enumerate(zip(paths, report.files, strict=True)):
             if file.sound:
@@ -307,7 +307,7 @@ def _write(
     except BaseException as error:
         shutil.rmtree(target, ignore_errors=True)
         if isinstance(error, OSError):
-            raise _refused(target, error) from error
+            raise _write_error(target, error) from error
         raise
 
 
@@ -358,7 +358,7 @@ def _write_metadata(target: Path, kept: list[FileReport], report: RepairReport, 
     (target / METADATA_FILE).write_bytes(text)
 
 
-def _refused(target: Path, error: OSError) -> RecordingError:
+def _write_error(target: Path, error: OSError) -> RecordingError:
     return RecordingError(
         "AMX6801",
         target,

@@ -58,7 +58,7 @@ class RackClock:
         if simulated is not None:
             self.pace = SimulatedPacer(scheduler, self._publish_time, rate=simulated.rate, turn=lock.for_scan)
         elif follows:
-            self.pace = self._follower = FollowingPacer(scheduler, self._jumped, turn=lock.for_scan)
+            self.pace = self._follower = FollowingPacer(scheduler, self._report_jump, turn=lock.for_scan)
         else:
             self.pace = Pacer(scheduler, turn=lock.for_scan)
 
@@ -132,7 +132,7 @@ class RackClock:
                 self._node.get_logger().warning(text)
             self._rack_context.health.note(TAKEN, CLOCK, lambda: text)
 
-    def _jumped(self, by_ns: int) -> None:
+    def _report_jump(self, by_ns: int) -> None:
         assert self._rack_context is not None
         assert self._node is not None
         if by_ns > 0:

@@ -114,7 +114,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         LifecycleNodeMixin.__init__(self)
         self._duties, self._guard, self._enter = duties, guard, enter
         change = self._service_change_state
-        change.callback = self._requested
+        change.callback = self._handle_request
         allow_deferred(change)
         for service in (
             change,
@@ -176,10 +176,10 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         self._trigger(result.to_label())
         if result is _ERROR and error is not None:
             self._guard.report(f"transition {transition} failed, everything is stopped", error)
-            self._trigger(self._stopped().to_label())
+            self._trigger(self._stop().to_label())
         done(error)
 
-    def _stopped(self) -> TransitionCallbackReturn:
+    def _stop(self) -> TransitionCallbackReturn:
         try:
             self._duties.fail()
         except Exception as error:
@@ -187,7 +187,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
             return _FAILURE
         return _SUCCESS
 
-    def _requested(self, request: Any, response: Any) -> Any:
+    def _handle_request(self, request: Any, response: Any) -> Any:
         name = _name(request.transition)
         reason = self._duties.refusal(name) if name else "it is not a transition that can be asked for"
         if reason is not None:

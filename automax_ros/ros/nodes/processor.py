@@ -76,7 +76,7 @@ class ProcessorNode(ManagedModuleNode):
     def _report_errors(self, task: Task, record: ScanRecord) -> None:
         is_logged = self._error_throttles[task.name].passes()
         for number, (line, code) in enumerate(record.errors):
-            describe = partial(_described, task, LogEntry(line, code, record.scan))
+            describe = partial(_describe, task, LogEntry(line, code, record.scan))
             self.rack_context.health.note("run-time error", (task.name, line, code), describe)
             if is_logged and number < ERRORS_SHOWN:
                 self.get_logger().warning(describe())
@@ -159,7 +159,7 @@ class ProcessorNode(ManagedModuleNode):
         return self.status(task.name, level, text, task.slot, shown)
 
 
-def _described(task: Task, entry: LogEntry) -> str:
+def _describe(task: Task, entry: LogEntry) -> str:
     return f"{task.name}: {entry.describe()}"
 
 
