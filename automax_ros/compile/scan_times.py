@@ -130,7 +130,7 @@ def _either(ways: _Ways, *names: _Way) -> Span | None:
 
 def _subroutines(program: Program, model: CostModel, inner: dict[int, _Ways]) -> dict[int, _Ways]:
     """Return the exits of each subroutine, where those that it calls have the exits ``inner``."""
-    called = _called(program.scan)
+    called = _called_lines(program.scan)
     if not called:
         return {}
     edges = _Suite(program, model, inner, inside=True).edges(program.scan)
@@ -145,7 +145,7 @@ def _to_the_end(ways: _Ways) -> _Ways:
     return rest if end is None else {**rest, _Way.END: end}
 
 
-def _called(statements: tuple[Statement, ...]) -> frozenset[int]:
+def _called_lines(statements: tuple[Statement, ...]) -> frozenset[int]:
     return frozenset(line for item, _ in statements_in_order(statements) if _calls(item) for line in jumps_of(item))
 
 
@@ -189,7 +189,7 @@ class _Suite:
             least, most = self.model.block_bounds_ns(self.program.calls[statement.span])
             return {_Way.NEXT: Span(least, most)}
         if isinstance(statement, If):
-            inner = _joined(self._branch(statement), self.ways(statement.otherwise))
+            inner = _join(self._branch(statement), self.ways(statement.otherwise))
         elif isinstance(statement, For):
             inner = self._loop(statement)
         else:
@@ -208,13 +208,13 @@ class _Suite:
             return self._to_line(statement.line, gosub=True)
         if isinstance(statement, OnJump):
             past: _Ways = {_Way.NEXT: NOTHING}
-            return _joined(past, *(self._to_line(line, statement.gosub) for line in statement.lines))
+            return _join(past, *(self._to_line(line, statement.gosub) for line in statement.lines))
         if isinstance(statement, Return) and self.inside:
             return {_Way.RETURN: NOTHING}
         if isinstance(statement, (End, Stop)):
             return {_Way.END if isinstance(statement, End) else _Way.STOP: NOTHING}
         past = {_Way.NEXT: NOTHING}
-        return _joined(past, *(self._to_line(line, gosub=False) for line in jumps_of(statement)))
+        return _join(past, *(self._to_line(line, gosub=False) for line in jumps_of(statement)))
 
     def _to_line(self, line: int, gosub: bool) -> _Ways:
         """Return the exits of a jump or a GOSUB; one that nests too deep is skipped."""
@@ -261,7 +261,7 @@ def _count(first: int, last: int, step: int, bounds: tuple[int, int]) -> int:
     return max(0, (last - first) // step + 1)
 
 
-def _joined(*several: _Ways) -> _Ways:
+def _join(*several: _Ways) -> _Ways:
     result: _Ways = {}
     for ways in several:
         for way, span in ways.items():

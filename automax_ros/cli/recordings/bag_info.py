@@ -38,7 +38,7 @@ def lines_of(content: Mapping[str, Any]) -> list[str]:
         *_section("writers", _writers(content["writers"])),
         *_section("topics", [_TOPIC_HEAD, *map(_topic, content["topics"])] if content["topics"] else []),
         *_section("files", [_FILE_HEAD, *map(_file, content["files"])]),
-        *_section("stored inside", [_stored(item) for item in content["attachments"]]),
+        *_section("stored inside", [_file_cells(item) for item in content["attachments"]]),
         *_section("recorded with", [[key, value] for key, value in content["custom_data"].items()]),
         *_verdict(content),
     ]
@@ -125,7 +125,7 @@ def _file(file: Mapping[str, Any]) -> list[str]:
     return [file["name"], _size(file["size"]), str(file["chunks"]), *sizes]
 
 
-def _stored(item: Mapping[str, Any]) -> list[str]:
+def _file_cells(item: Mapping[str, Any]) -> list[str]:
     return [item["name"], _size(item["size"]), f"sha256 {item['sha256']}"]
 
 
@@ -277,8 +277,8 @@ def _task(info: BagInfo, name: str, facts: TaskFacts | None) -> dict[str, Any]:
 
 def _operation(info: BagInfo, item: Operation) -> dict[str, Any]:
     start = info.table.stamp if info.table else 0
-    told = {"at": (item.stamp - start) / NS_PER_S, "what": item.what, "task": item.task, "ok": item.ok}
-    return {**told, "reason": item.reason, "detail": item.detail}
+    fields = {"at": (item.stamp - start) / NS_PER_S, "what": item.what, "task": item.task, "ok": item.ok}
+    return {**fields, "reason": item.reason, "detail": item.detail}
 
 
 def _variables(info: BagInfo) -> dict[str, Any]:

@@ -117,10 +117,10 @@ class _Session:
     def record(
         self, folder: Path, wait_ns: int, duration_ns: int | None, how: _Storing, own_files: list[RackFile]
     ) -> int:
-        table = self._found(wait_ns)
+        table = self._find_rack(wait_ns)
         if table is None:
             return 0
-        chosen = _chosen(table, how.tasks)
+        chosen = _choose_tasks(table, how.tasks)
         self._expects_scans = bool(_tasks(table))
         files = self._files(own_files)
         if self._stop.requested:
@@ -143,7 +143,7 @@ class _Session:
         self._notes(recording)
         return self._summary(recording, folder)
 
-    def _found(self, wait_ns: int) -> VariableTable | None:
+    def _find_rack(self, wait_ns: int) -> VariableTable | None:
         try:
             table = self._recorder.find(wait_ns, lambda: self._stop.requested)
         except CdrError as error:
@@ -293,7 +293,7 @@ def _tasks(table: VariableTable) -> list[str]:
     return [writer.name for writer in table.writers if writer.kind == WriterKind.TASK]
 
 
-def _chosen(table: VariableTable, text: str | None) -> set[str] | None:
+def _choose_tasks(table: VariableTable, text: str | None) -> set[str] | None:
     if text is None:
         return None
     known = _tasks(table)

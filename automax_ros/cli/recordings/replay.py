@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     new = {name: _source(name, path) for name, path in files.items()}
     _require_replayed(options, new)
     try:
-        report = _replayed(Replay(arguments.bag, new, options), where, arguments)
+        report = _run_replay(Replay(arguments.bag, new, options), where, arguments)
     except SourceRefused as error:
         for source, diagnostics in error.findings:
             print_diagnostics(diagnostics, source, sys.stderr)
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if report.identical else 1
 
 
-def _replayed(replay: Replay, where: Workers, arguments: argparse.Namespace) -> ReplayReport:
+def _run_replay(replay: Replay, where: Workers, arguments: argparse.Namespace) -> ReplayReport:
     for source, diagnostics in replay.warnings:
         print_warning_count([(source, diagnostics)], Path(source.name).name, Path(source.name))
     with share_shown("replay") as show:

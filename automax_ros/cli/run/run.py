@@ -85,7 +85,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
                 display.message(text)
             display.printed()
             display.update(rack.now_ns)
-            recording.tell()
+            recording.report_failure()
     finally:
         if recorder is not None:
             stream.end()
@@ -93,7 +93,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     state.end()
     for text in state.news():
         display.message(text)
-    recording.tell()
+    recording.report_failure()
     display.finish(plan.record, complete=not recording.failed)
     failed = recording.failed or state.failed or stimulation.refused > 0
     return conclude(rack, plan, report_at_end(rack, stimulation), failed=failed)

@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
         from automax_ros.cli.output.figure import require_matplotlib
 
         require_matplotlib("--output")
-    response = _measured(arguments, program, call, tuning)
+    response = _measure(arguments, program, call, tuning)
     if arguments.output is not None:
         from automax_ros.cli.tasks.response_plot import plot
 
@@ -101,7 +101,7 @@ def _show(arguments: argparse.Namespace, response: BlockResponse) -> None:
         sys.stdout.write(notes(response))
 
 
-def _measured(arguments: argparse.Namespace, program: Program, call: DynamicCall, tuning: Tuning) -> BlockResponse:
+def _measure(arguments: argparse.Namespace, program: Program, call: DynamicCall, tuning: Tuning) -> BlockResponse:
     parameters, assumed = call.standing_inputs()
     require_running(call)
     return measured_response(
@@ -221,7 +221,7 @@ def _step(response: BlockResponse) -> str:
     for place, laplace in zip(places, ideal, strict=True):
         time = f"{place * step.period_s:.6g}"
         rows.append((time, str(step.output[place]), fixed(step.design[place], 1), fixed(laplace, 1)))
-    return _step_summary(response) + _aligned(rows)
+    return _step_summary(response) + _align(rows)
 
 
 def step_places(scans: int, rows: int) -> list[int]:
@@ -251,7 +251,7 @@ def _bode(response: BlockResponse) -> str:
                 f"  {point.mark}" if point.mark else "",
             )
         )
-    table = _aligned(rows, left=(5, 10))
+    table = _align(rows, left=(5, 10))
     head, _, body = table.partition("\n")
     places = [head.index("dB", 0)]
     while len(places) < 3:
@@ -301,7 +301,7 @@ def _angle(gain: complex, degrees: float) -> str:
     return _NOTHING if level is None or level < -200.0 else fixed(degrees, 1)
 
 
-def _aligned(rows: Sequence[tuple[str, ...]], left: Sequence[int] = ()) -> str:
+def _align(rows: Sequence[tuple[str, ...]], left: Sequence[int] = ()) -> str:
     right = set(range(len(rows[0]))).difference(left)
     return "".join(f"  {line}\n" for line in table(rows, right))
 

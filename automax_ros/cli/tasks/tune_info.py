@@ -362,10 +362,10 @@ def _corners(tuning: Tuning) -> Rows:
             yield "corner", f"{' ' * width}  ! above the Nyquist frequency"
             continue
         gains = f"Laplace {gain_text(corner.laplace)}, discrete {gain_text(corner.discrete)}"
-        yield "corner", f"{' ' * width}  {gains}{_moved(corner)}"
+        yield "corner", f"{' ' * width}  {gains}{_mapped_text(corner)}"
 
 
-def _moved(corner: Corner) -> str:
+def _mapped_text(corner: Corner) -> str:
     if corner.warping is None or corner.mapped_rad_s is None or abs(corner.warping) < 5e-5:
         return ""
     return f"; mapped to {number_text(corner.mapped_rad_s, 5)} rad/s ({corner.warping * 100.0:+.2f} %)"

@@ -6,7 +6,7 @@ from automax_ros.core.diagnostics import Diagnostic, Note, Span
 from automax_ros.language.text.tokens import SourceFault, Token
 
 DIAGNOSTIC_LIMIT = 200
-"""Most problems reported of one source; one more says that there are others (decision: nobody reads more)."""
+"""Most problems reported of one source; one more says that there are others (decision: more are not read)."""
 
 
 class TooManyProblemsError(Exception):

@@ -77,7 +77,7 @@ def _codes(rack: Rack, tasks: list[str]) -> Iterator[str]:
     if cause is not None and cause.code and _concerns(rack, cause.task, tasks):
         yield cause.code
     for name in tasks:
-        yield from _logged(rack.task(name).errors)
+        yield from _logged_codes(rack.task(name).errors)
 
 
 def _concerns(rack: Rack, task: str, tasks: list[str]) -> bool:
@@ -92,7 +92,7 @@ def _is_on_processor(rack: Rack, task: str) -> bool:
     return any(item.name == task and isinstance(module, ProcessorConfig) for module, item in placed)
 
 
-def _logged(log: ErrorLog) -> Iterator[str]:
+def _logged_codes(log: ErrorLog) -> Iterator[str]:
     """Yield the codes in a log, the newest first."""
     return (entry.hardware for entry in reversed(log.entries) if entry.hardware)
 

@@ -177,7 +177,7 @@ class CommonLog:
         Raises:
             BagError: they do not fit the table of variables.
         """
-        return self._typed(values, stamp, self._read_kinds)
+        return self._typed_entries(values, stamp, self._read_kinds)
 
     def entries(self, values: Values, stamp: int) -> list[Entry]:
         """Return the entries of a message, each in its variable's own type.
@@ -185,9 +185,9 @@ class CommonLog:
         Raises:
             BagError: they do not fit the table of variables.
         """
-        return self._typed(values, stamp, self._kinds)
+        return self._typed_entries(values, stamp, self._kinds)
 
-    def _typed(self, values: Values, stamp: int, kinds: Mapping[int, _Kind]) -> list[Entry]:
+    def _typed_entries(self, values: Values, stamp: int, kinds: Mapping[int, _Kind]) -> list[Entry]:
         if not values.variable:
             return []
         texts = iter(values.text)
@@ -260,27 +260,27 @@ class WatchedValues:
     def __init__(self, watched: Sequence[Watched]) -> None:
         self._columns = {(item.variable, item.element): index for index, item in enumerate(watched)}
         self._shown: dict[int, Cell] = {}
-        self._told: dict[int, Cell] = {}
+        self._received: dict[int, Cell] = {}
 
     def take(self, entries: Iterable[Entry]) -> None:
         """Set the values of one message."""
         for variable, place, value in entries:
             index = self._columns.get((variable, place))
             if index is not None:
-                self._told[index] = value
+                self._received[index] = value
 
-    def tell(self, index: int, value: Cell) -> None:
+    def set_value(self, index: int, value: Cell) -> None:
         """Set the value of one column."""
-        self._told[index] = value
+        self._received[index] = value
 
     def changes(self) -> dict[int, Cell]:
         """Return the values that differ from those at the previous call."""
-        if not self._told:
+        if not self._received:
             return {}
         shown = self._shown
-        changed = {index: value for index, value in self._told.items() if value != shown.get(index)}
+        changed = {index: value for index, value in self._received.items() if value != shown.get(index)}
         shown.update(changed)
-        self._told.clear()
+        self._received.clear()
         return changed
 
 

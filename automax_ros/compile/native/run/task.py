@@ -52,11 +52,11 @@ def kept_translation(compiled: CompiledTask, cache: NativeCache, *, builds: bool
     key = translation_key(compiled, form)
     content = cache.read(key)
     if content is not None:
-        return _unpacked(content)
+        return _unpack(content)
     if not builds:
         raise NotNative(NOT_KEPT)
     source = translated(compiled, form)
-    cache.keep(key, _packed(source))
+    cache.keep(key, _pack(source))
     return source
 
 
@@ -68,7 +68,7 @@ def translation_key(compiled: CompiledTask, form: Form) -> str:
         *_TRANSLATOR,
         program.name,
         ast.dump(form.function, include_attributes=True),
-        *(f"{name} {_described(item)}" for name, item in sorted(form.known.items())),
+        *(f"{name} {_describe(item)}" for name, item in sorted(form.known.items())),
         sorted(form.views.items()),
         symbols,
         compiled.layout.fields,
@@ -78,7 +78,7 @@ def translation_key(compiled: CompiledTask, form: Form) -> str:
     return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()
 
 
-def _described(item: object) -> str:
+def _describe(item: object) -> str:
     """Return a description of a global of generated code; a function is described by its own name in the sources."""
     if isinstance(item, CoefficientFunction):
         return repr((item.block.name, item.period_s, sorted(item.literals.items()), item.evaluated))
@@ -86,11 +86,11 @@ def _described(item: object) -> str:
     return repr(item) if name is None else f"{getattr(item, '__module__', '')}.{name}"
 
 
-def _packed(source: NativeSource) -> bytes:
+def _pack(source: NativeSource) -> bytes:
     return zlib.compress(json.dumps([source.name, source.text, source.limits]).encode(), 1)
 
 
-def _unpacked(content: bytes) -> NativeSource:
+def _unpack(content: bytes) -> NativeSource:
     name, text, limits = json.loads(zlib.decompress(content))
     return NativeSource(name, text, tuple((low, high) for low, high in limits))
 
