@@ -6,7 +6,7 @@ import math
 import re
 from typing import Any
 
-from automax_ros.core.yaml_text import Node, Scalar, Sequence, read_yaml
+from automax_ros.core.yaml_text import Node, Scalar, YamlSequence, read_yaml
 
 NULL = re.compile(r"null|Null|NULL|~|")
 TRUTH = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
@@ -24,7 +24,7 @@ def data_of(text: str) -> Any:
 
 
 def _data(node: Node) -> Any:
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         return [_data(item) for item in node.items]
     if isinstance(node, Scalar):
         return _plain(node.text) if node.plain else node.text

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from automax_ros.cli.racks.schema import SCHEMAS
-from automax_ros.cli.shell.arguments import Command, Option, commands
+from automax_ros.cli.shell.arguments import Option, Subcommand, commands
 from automax_ros.core.problems import PROBLEMS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -41,7 +41,7 @@ def command_page() -> str:
     return "\n".join([head, "| command | what it does |", "| --- | --- |", *rows, "", *map(command_text, found)])
 
 
-def command_text(command: Command) -> str:
+def command_text(command: Subcommand) -> str:
     """Return a subcommand's part of the page, with its own subcommands."""
     name = f"automax {' '.join(command.words)}"
     parts = [f"{'#' * (len(command.words) + 1)} {name}\n", f"```text\n{command.usage}\n```\n"]

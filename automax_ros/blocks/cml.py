@@ -20,6 +20,7 @@ from typing import Any
 from automax_ros.blocks.declare.coefficients import is_within
 from automax_ros.blocks.declare.declaration import (
     Block,
+    BlockTimes,
     Fault,
     Form,
     Given,
@@ -28,7 +29,6 @@ from automax_ros.blocks.declare.declaration import (
     Output,
     Platform,
     Rule,
-    Times,
 )
 from automax_ros.blocks.declare.rules import Needs
 from automax_ros.core.ticks import DEFAULT_TICK_NS
@@ -279,7 +279,7 @@ DC_DRIVE_CML = Block(
     function="Regulates the armature current of an S6R drive, sequences its contactor and watches for its faults",
     inputs=INPUTS,
     outputs=OUTPUTS,
-    times=Times(None, None, None, None),
+    times=BlockTimes(None, None, None, None),
     rules=(
         WithinAtLine("REF_RATE", "AC_LINE_FREQ", LINE_HZ),
         WithinAtLine("REF_LAG", "AC_LINE_FREQ", LINE_HZ),

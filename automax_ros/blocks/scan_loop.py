@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declare.declaration import Block, Form, Input, Platform, Special, Time, Times
+from automax_ros.blocks.declare.declaration import Block, BlockTimes, Form, Input, Platform, Special, Time
 from automax_ros.core.ticks import MAX_TICKS
 
 SCAN_LOOP = Block(
@@ -28,7 +28,7 @@ SCAN_LOOP = Block(
         ),
     ),
     outputs=(),
-    times=Times(
+    times=BlockTimes(
         Time(80.00, t=1.6, i=2.5, b=3.8, d=4.1),
         Time(326.0, t=2.4, i=4.4, b=6.8, d=7.2),
         Time(350.00, i=2.20, b=2.00, d=3.30, alone=312.0),
@@ -43,7 +43,7 @@ SCAN_LOOP = Block(
     begins_scan=True,
 )
 
-END_TIMES = Times(
+END_TIMES = BlockTimes(
     Time(13.82, t=2.0, i=1.6, b=2.2, d=2.5),
     Time(60.0, t=3.2, i=2.8, b=4.3, d=4.9),
     Time(130.00, i=2.40, b=2.50, d=3.30, alone=100.0),
@@ -51,5 +51,5 @@ END_TIMES = Times(
 )
 """Execution times of the END statement: commit of the latched variables (tables 4 to 6)."""
 
-REMARK_TIMES = Times(Time(9.88), Time(40.0), Time(2.37), Time(6.92))
+REMARK_TIMES = BlockTimes(Time(9.88), Time(40.0), Time(2.37), Time(6.92))
 """Execution times of each ``!`` remark after SCAN_LOOP; REM takes none (53, tables 4 to 6)."""

@@ -51,7 +51,7 @@ from automax_ros.compile.base.emitter import (
     variable_name,
 )
 from automax_ros.compile.base.layout import Layout, Role, StateField, local_field
-from automax_ros.compile.base.native_source import Form
+from automax_ros.compile.base.native_source import TaskFunction
 from automax_ros.compile.base.scan_io import (
     BackgroundIo,
     LineForm,
@@ -144,7 +144,7 @@ class CompiledTask:
         """One scan, or a BASIC task's burst, line by line, for stepping."""
         return self._compilation.line_form()
 
-    def form(self, name: str) -> Form:
+    def form(self, name: str) -> TaskFunction:
         """Return one of the functions for translation into another language."""
         return self._compilation.form(name)
 
@@ -206,8 +206,8 @@ class _Compilation(ABC):
         parts = [self._lower(name) for name in names]
         return [self._wrap(*part) for part in parts]
 
-    def form(self, name: str) -> Form:
-        return Form(self.definitions(name)[0], dict(self._globals), self._views)
+    def form(self, name: str) -> TaskFunction:
+        return TaskFunction(self.definitions(name)[0], dict(self._globals), self._views)
 
     def line_form(self) -> LineForm:
         """Compile the form that yields before each line; it applies forces."""

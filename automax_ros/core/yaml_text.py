@@ -34,7 +34,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")
 _TRUTH = {"true": True, "false": False}
 
 
-Node: TypeAlias = "Scalar | Sequence | Mapping"
+Node: TypeAlias = "Scalar | YamlSequence | YamlMapping"
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _WIDTH = 1 << 20
 """No value is broken over lines."""
@@ -75,7 +75,7 @@ class Scalar:
 
 
 @dataclass(frozen=True)
-class Sequence:
+class YamlSequence:
     """A list."""
 
     items: tuple[Node, ...]
@@ -83,7 +83,7 @@ class Sequence:
 
 
 @dataclass(frozen=True)
-class Mapping:
+class YamlMapping:
     """Keys and values in the order of the file; a key may occur twice."""
 
     entries: tuple[tuple[Scalar, Node], ...]
@@ -122,9 +122,9 @@ def raise_flaw(flaw: Flaw, message: str, span: Span, hint: str | None) -> None:
 
 
 def _data(node: Node, typed: bool) -> Any:
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         return [_data(item, typed) for item in node.items]
-    if isinstance(node, Mapping):
+    if isinstance(node, YamlMapping):
         return {key.text: _data(value, typed) for key, value in node.entries}
     if typed and node.plain:
         return int(node.text) if _WHOLE.fullmatch(node.text) else _TRUTH.get(node.text, node.text)
@@ -230,15 +230,15 @@ class _Reader:
         if tag is not None:
             self._refuse(f"the tag {quoted(tag)}", event, "remove it")
 
-    def _sequence(self, start: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Sequence:
+    def _sequence(self, start: yaml.Event, events: Iterator[yaml.Event], depth: int) -> YamlSequence:
         items: list[Node] = []
         for event in events:
             if isinstance(event, yaml.SequenceEndEvent):
                 break
             items.append(self._node(event, events, depth + 1))
-        return Sequence(tuple(items), self._span(start))
+        return YamlSequence(tuple(items), self._span(start))
 
-    def _mapping(self, start: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Mapping:
+    def _mapping(self, start: yaml.Event, events: Iterator[yaml.Event], depth: int) -> YamlMapping:
         entries: list[tuple[Scalar, Node]] = []
         for event in events:
             if isinstance(event, yaml.MappingEndEvent):
@@ -251,7 +251,7 @@ class _Reader:
                 self._report(Flaw.EXTRA, "the merge key '<<' is not read", key.span, "write the values again")
             else:
                 entries.append((key, value))
-        return Mapping(tuple(entries), self._span(start))
+        return YamlMapping(tuple(entries), self._span(start))
 
     def _refuse(self, what: str, event: yaml.Event, hint: str) -> None:
         self._report(Flaw.EXTRA, f"{what} is not allowed in {self._what}", self._span(event), hint)
@@ -276,13 +276,13 @@ def yaml_of(root: Node) -> str:
 def _events(node: Node) -> Iterator[yaml.Event]:
     if isinstance(node, Scalar):
         yield _scalar(node)
-    elif isinstance(node, Sequence):
+    elif isinstance(node, YamlSequence):
         yield yaml.SequenceStartEvent(None, None, True, flow_style=True)
         for item in node.items:
             yield from _events(item)
         yield yaml.SequenceEndEvent()
     else:
-        assert isinstance(node, Mapping)
+        assert isinstance(node, YamlMapping)
         yield yaml.MappingStartEvent(None, None, True, flow_style=not node.entries)
         for key, value in node.entries:
             yield _scalar(key)

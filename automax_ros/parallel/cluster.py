@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from automax_ros.parallel.installation import Installation, installation
+from automax_ros.parallel.installation import WorkerInstallation, installation
 from automax_ros.parallel.job import MOST_TRIES, ClusterFault, Job, JobFault, JobResult, death_of, fault_of, result_of
 
 _T = TypeVar("_T")
@@ -108,7 +108,7 @@ class Refusal:
     """Why a worker has not started a piece: another installation, or a piece that was tried often enough."""
 
     worker: str
-    installed: Installation
+    installed: WorkerInstallation
     deaths: tuple[str, ...] = ()
 
 
@@ -116,7 +116,7 @@ Answer = tuple[Any, JobFault | None]
 """The result of a piece, or its fault."""
 
 
-def attempt(pickled: bytes, topic: str, wanted: Installation) -> Answer | Refusal:
+def attempt(pickled: bytes, topic: str, wanted: WorkerInstallation) -> Answer | Refusal:
     """Do a piece and return its outcome.
 
     The scheduler stores under ``topic`` which workers have started and which have finished: the others have died during
@@ -267,7 +267,7 @@ class _Cluster:
                 self._client.cancel(futures, force=True)
 
     def _unlike(self, worker: str, found: object) -> ClusterFault:
-        if not isinstance(found, Installation):
+        if not isinstance(found, WorkerInstallation):
             what = f"worker {worker} cannot import automax_ros as it is here: {found}"
         elif (found.version, found.sources) != (self._own.version, self._own.sources):
             what = f"worker {worker} has automax_ros {found}, here is {self._own}"
@@ -276,7 +276,7 @@ class _Cluster:
         return ClusterFault("AMX6854", self._scheduler, what, _SAME)
 
 
-def _other_machine(worker: str, found: Installation, own: Installation) -> str:
+def _other_machine(worker: str, found: WorkerInstallation, own: WorkerInstallation) -> str:
     if found.python != own.python:
         return f"worker {worker} has {found.python}, here is {own.python}"
     if found.numpy != own.numpy:

@@ -26,7 +26,7 @@ _NUMPY = (np.sin, np.cos, np.tan, np.arctan, np.exp, np.log, np.sqrt, np.cumsum,
 
 
 @dataclass(frozen=True)
-class Installation:
+class WorkerInstallation:
     """The version of the package, a SHA-256 of all its sources, the interpreter and NumPy, and their results.
 
     ``results`` is a SHA-256 of values of functions of the C library and of NumPy, bit for bit: they differ in their
@@ -45,7 +45,7 @@ class Installation:
 
 
 @lru_cache(maxsize=1)
-def installation() -> Installation:
+def installation() -> WorkerInstallation:
     """Return the installation of this machine."""
     folder = Path(automax_ros.__file__).parent
     found = hashlib.sha256()
@@ -54,7 +54,7 @@ def installation() -> Installation:
         found.update(f"{path.relative_to(folder).as_posix()} {len(content)}\n".encode())
         found.update(content)
     python = f"{platform.python_implementation()} {platform.python_version()}"
-    return Installation(automax_ros.__version__, found.hexdigest(), python, np.__version__, results_digest())
+    return WorkerInstallation(automax_ros.__version__, found.hexdigest(), python, np.__version__, results_digest())
 
 
 def results_digest() -> str:

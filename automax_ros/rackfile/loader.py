@@ -13,7 +13,7 @@ from automax_ros.core.json_schema import Keys, Schema, document, either, entries
 from automax_ros.core.kinds import Direction
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType
-from automax_ros.core.yaml_text import Mapping, Node, Scalar, read_yaml
+from automax_ros.core.yaml_text import Node, Scalar, YamlMapping, read_yaml
 from automax_ros.rackfile.model.config import MAX_SLOT, CommonVariable, ModuleLoss, RackConfig, Timing
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.ros_names import namespace
@@ -110,7 +110,7 @@ class SlotReader:
 
     def _module(self, slot: int, key: Scalar, node: Node) -> ModuleConfig | None:
         what = f"slot {slot}"
-        if not isinstance(node, Mapping):
+        if not isinstance(node, YamlMapping):
             given = module_number(node.text) if isinstance(node, Scalar) and len(node.text) < 10 else ""
             hint = f"write {{module: {given if given in SUPPORTED else '57C435'}}}"
             wrong_kind(node, what, "keys and values", self._findings, hint)

@@ -12,8 +12,8 @@ from automax_ros.core.diagnostics import Span
 from automax_ros.core.json_schema import Schema
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.user_error import UserError
-from automax_ros.core.yaml_text import Mapping as Keys
 from automax_ros.core.yaml_text import Node, Scalar, raise_flaw, read_yaml, yaml_of
+from automax_ros.core.yaml_text import YamlMapping as Keys
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.sections.plants import KEYS
 

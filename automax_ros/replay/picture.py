@@ -19,7 +19,7 @@ from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.common_log import Key
 from automax_ros.replay.engine import Replay
 from automax_ros.replay.scans.commons import UnknownValue
-from automax_ros.replay.scans.report import Difference, Kind, ReplayReport
+from automax_ros.replay.scans.report import Difference, DifferenceKind, ReplayReport
 from automax_ros.replay.scans.task import TaskReplay
 
 MOST_LANES = 5
@@ -123,7 +123,9 @@ def _plain(text: str) -> str:
 
 def _drawable(report: ReplayReport) -> list[Difference]:
     return [
-        item for item in report.differences if item.kind is Kind.VARIABLE and not isinstance(item.first.recorded, str)
+        item
+        for item in report.differences
+        if item.kind is DifferenceKind.VARIABLE and not isinstance(item.first.recorded, str)
     ]
 
 

@@ -27,7 +27,7 @@ from automax_ros.rack.base.stop_cause import StopCause
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.scheduled_task import ScheduledTask
 from automax_ros.rackfile.model.config import RackConfig, Timing
-from automax_ros.runtime.scan.execution import IDEAL, Job, Place, Steps
+from automax_ros.runtime.scan.execution import IDEAL, Place, ScanJob, Steps
 from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
 
 
@@ -78,7 +78,7 @@ class ByLines:
         self.held_tasks: dict[str, ScheduledTask] = {}
         self.held: HeldScan | None = None
 
-    def begin(self, job: Job, now_ns: int, skipped: int) -> None:
+    def begin(self, job: ScanJob, now_ns: int, skipped: int) -> None:
         """Execute a job, or hold it."""
         item = self.held_tasks.get(job.name)
         if item is None:
@@ -96,21 +96,21 @@ class ByLines:
         held.finish()
         return False
 
-    def busy(self, job: Job) -> bool:
+    def busy(self, job: ScanJob) -> bool:
         """Return whether a job's scan is held."""
         return self.held is not None and self.held.item is job
 
-    def drop(self, job: Job) -> None:
+    def drop(self, job: ScanJob) -> None:
         """Abandon a held scan."""
         if self.held is not None and self.held.item is job:
             self.held.close()
             self.held = None
 
-    def place(self, job: Job) -> Place | None:
+    def place(self, job: ScanJob) -> Place | None:
         """Return None: another rack could not continue a held scan."""
         return IDEAL.place(job)
 
-    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
+    def resume(self, job: ScanJob, place: Place, steps: Steps | None) -> None:
         """Refuse, as ideal execution does.
 
         Raises:
@@ -120,7 +120,7 @@ class ByLines:
 
 
 @dataclass(frozen=True)
-class Variable:
+class SteppedVariable:
     """A simple variable or an array's element. ``task`` is its task, "" for a common."""
 
     label: str
@@ -146,7 +146,7 @@ class Variables:
     rack: Rack
     execution: ByLines
 
-    def find(self, name: str) -> Variable:
+    def find(self, name: str) -> SteppedVariable:
         """Return the variable with a name.
 
         Raises:
@@ -154,24 +154,24 @@ class Variables:
         """
         return self._of_task(name) if "." in name else self._common(name)
 
-    def of_task(self, name: str) -> Iterator[Variable]:
+    def of_task(self, name: str) -> Iterator[SteppedVariable]:
         """Yield the simple variables of a task, its commons too, in the order of declaration."""
         for symbol in self.rack.task(name).compiled.program.symbols.values():
             if not symbol.dimensions:
                 common = symbol.scope is Scope.COMMON
                 yield self._common(symbol.name) if common else self._of_task(f"{name}.{symbol.name}")
 
-    def _common(self, name: str) -> Variable:
+    def _common(self, name: str) -> SteppedVariable:
         meant = self.rack.config.common(name)
         view = self.rack.memory.view(meant.name)
         read = partial(self.rack.memory.read_now, view, meant.index)
-        return Variable(meant.label, meant.variable.type, meant.variable.length, "", read)
+        return SteppedVariable(meant.label, meant.variable.type, meant.variable.length, "", read)
 
-    def _of_task(self, name: str) -> Variable:
+    def _of_task(self, name: str) -> SteppedVariable:
         meant = local_named(self.rack.tasks, name)
         kind = meant.variable
         read = partial(self._local, meant.task, kind.name, meant.element.index)
-        return Variable(meant.label, kind.type, kind.length, meant.task.name, read)
+        return SteppedVariable(meant.label, kind.type, kind.length, meant.task.name, read)
 
     def _local(self, task: Task, name: str, index: int) -> Value:
         held = self.execution.held
@@ -220,7 +220,7 @@ class Stepper:
         self.rack = Rack(config, execution=self._execution if self.by_lines else None)
         self.variables = Variables(self.rack, self._execution)
         self.lines: list[tuple[str, int]] = []
-        self.watched: dict[str, Variable] = {}
+        self.watched: dict[str, SteppedVariable] = {}
         self._interrupted = interrupted
         self._at_once = ""
 
@@ -250,7 +250,7 @@ class Stepper:
             self.lines.append((item.name, line))
         self._hold()
 
-    def break_on(self, name: str) -> Variable:
+    def break_on(self, name: str) -> SteppedVariable:
         """Halt whenever a variable has changed; return it.
 
         Raises:

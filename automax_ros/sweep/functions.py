@@ -70,7 +70,7 @@ class Rms(Accumulator):
         return math.sqrt(self._sum / end_ns)
 
 
-class Range(Accumulator):
+class SignalRange(Accumulator):
     """The least and the greatest value."""
 
     def __init__(self) -> None:
@@ -81,21 +81,21 @@ class Range(Accumulator):
         self.most = max(self.most, value)
 
 
-class Least(Range):
+class Least(SignalRange):
     """The least value."""
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
         return self.least
 
 
-class Most(Range):
+class Most(SignalRange):
     """The greatest value."""
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
         return self.most
 
 
-class MostAbsolute(Range):
+class MostAbsolute(SignalRange):
     """The greatest distance from 0."""
 
     def result(self, last: float, end_ns: int) -> float | None:  # noqa: ARG002
@@ -212,7 +212,7 @@ def _last_below(stack: list[tuple[float, int]], level: float) -> int:
     return stack[place - 1][1] if place else 0
 
 
-class Overshoot(Range):
+class Overshoot(SignalRange):
     """How far a signal exceeds its target, % of the step from its value before the window; None without a step."""
 
     def __init__(self, target: float | None = None) -> None:

@@ -13,7 +13,7 @@ from automax_ros.core.types import Value
 from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number
 from automax_ros.rack.rack import Rack
-from automax_ros.sweep.quantities import Quantity, Variable, variable_named
+from automax_ros.sweep.quantities import Quantity, VariedVariable, variable_named
 
 MOST_RUNS = 100_000
 """Most runs of one sweep (decision)."""
@@ -28,7 +28,7 @@ Point = tuple[Value, ...]
 class Varied:
     """A quantity with its values; without ``values``, allowed only in a sample, it is from ``low`` to ``high``."""
 
-    variable: Variable
+    variable: VariedVariable
     values: tuple[Value, ...] = ()
     low: Fraction = Fraction(0)
     high: Fraction = Fraction(0)
@@ -121,12 +121,12 @@ def _check_count(count: int) -> None:
         )
 
 
-def _exact(variable: Variable, text: str) -> Fraction:
+def _exact(variable: VariedVariable, text: str) -> Fraction:
     variable.accepted(text.strip())
     return Fraction(text.strip())
 
 
-def _count(variable: Variable, text: str) -> int:
+def _count(variable: VariedVariable, text: str) -> int:
     label = variable.quantity.label
     try:
         found = number(text)
@@ -137,7 +137,7 @@ def _count(variable: Variable, text: str) -> int:
     return int(found)
 
 
-def _spread(variable: Variable, low: Fraction, high: Fraction, count: int) -> tuple[Value, ...]:
+def _spread(variable: VariedVariable, low: Fraction, high: Fraction, count: int) -> tuple[Value, ...]:
     """Return values at equal distances, both ends included; whole numbers are rounded, each once."""
     exact = (low + (high - low) * number / (count - 1) for number in range(count))
     if variable.is_whole:

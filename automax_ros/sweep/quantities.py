@@ -11,7 +11,7 @@ from automax_ros.core.types import DataType, Value, bare_name
 from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number, value_text, whole_number
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.model.value_names import Tuning, setting, tunables_of, tuning
+from automax_ros.rackfile.model.value_names import TunableSetting, setting, tunables_of, tuning
 from automax_ros.rackfile.plant_numbers import PlantNumber, plant_number
 
 
@@ -20,7 +20,7 @@ class Beginning:
     """Start values of one run: other numbers of plants, tunables, and commons as an operator would write them."""
 
     plants: dict[PlantNumber, str] = field(default_factory=dict)
-    tunings: list[Tuning] = field(default_factory=list)
+    tunings: list[TunableSetting] = field(default_factory=list)
     settings: list[tuple[str, Value]] = field(default_factory=list)
 
 
@@ -45,13 +45,13 @@ class Quantity:
         if self.plant is not None:
             beginning.plants[self.plant] = self.text(value)
         elif self.tunable is not None:
-            beginning.tunings.append(Tuning(*self.tunable, value))
+            beginning.tunings.append(TunableSetting(*self.tunable, value))
         else:
             beginning.settings.append((self.label, value))
 
 
 @dataclass(frozen=True)
-class Variable:
+class VariedVariable:
     """A quantity with its rules: ``accepted`` returns the value that a text gives it, or raises UserError.
 
     ``is_whole``: only whole numbers; ``is_number``: it has values between others.
@@ -63,7 +63,7 @@ class Variable:
     is_number: bool = True
 
 
-def variable_named(rack: Rack, text: str) -> Variable:
+def variable_named(rack: Rack, text: str) -> VariedVariable:
     """Return the quantity with a name: ``REF%``, ``TABLE%(3)``, ``SPEED.KP``, ``UNWIND.load.torque_nm``.
 
     If a task and a plant have the same name, the task's tunables come first (decision).
@@ -86,7 +86,7 @@ def variable_named(rack: Rack, text: str) -> Variable:
     )
 
 
-def _common(rack: Rack, text: str) -> Variable:
+def _common(rack: Rack, text: str) -> VariedVariable:
     try:
         meant = rack.config.common(text)
     except NameFault as fault:
@@ -96,7 +96,7 @@ def _common(rack: Rack, text: str) -> Variable:
     def accepted(given: str) -> Value:
         return setting(rack.config, f"{meant.label}={given}")[1]
 
-    return Variable(Quantity(meant.label), accepted, kind.is_integer, kind.is_numeric)
+    return VariedVariable(Quantity(meant.label), accepted, kind.is_integer, kind.is_numeric)
 
 
 def _tunable_hint(rack: Rack, text: str) -> str | None:
@@ -112,7 +112,7 @@ def _is_tunable(rack: Rack, task: str, name: str) -> bool:
     return name.strip().upper() in {*known, *map(bare_name, known)}
 
 
-def _tunable(rack: Rack, owner: str, name: str) -> Variable:
+def _tunable(rack: Rack, owner: str, name: str) -> VariedVariable:
     task = rack.task(owner)
     program = task.compiled.program
     known = tunables_of(program)
@@ -130,10 +130,10 @@ def _tunable(rack: Rack, owner: str, name: str) -> Variable:
             raise UserError(f"{owner}.{error}") from None
 
     quantity = Quantity(f"{owner}.{bare_name(full)}", tunable=(owner, full))
-    return Variable(quantity, accepted, known[full].type is not DataType.REAL)
+    return VariedVariable(quantity, accepted, known[full].type is not DataType.REAL)
 
 
-def _plant(rack: Rack, text: str) -> Variable:
+def _plant(rack: Rack, text: str) -> VariedVariable:
     found = plant_number(rack.config, text)
 
     def accepted(given: str) -> Value:
@@ -145,4 +145,4 @@ def _plant(rack: Rack, text: str) -> Variable:
             raise UserError(f"{found.label} = {value:.10g} lies outside {found.low:.10g} to {found.high:.10g}")
         return value
 
-    return Variable(Quantity(found.label, plant=found), accepted, found.is_whole)
+    return VariedVariable(Quantity(found.label, plant=found), accepted, found.is_whole)

@@ -115,14 +115,14 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """Result of a run: a number or None for each measure; ``fault`` is the reason of a failure, or ""."""
 
     measures: tuple[float | None, ...]
     fault: str = ""
 
 
-def run_points(plan: Plan, points: Sequence[Point]) -> list[Outcome]:
+def run_points(plan: Plan, points: Sequence[Point]) -> list[RunOutcome]:
     """Run points one after the other, as one job; raises UserError if the stimuli file differs from the plan's."""
     if plan.stimuli is not None and _digest(plan.stimuli.path) != plan.stimuli.digest:
         raise UserError(f"the stimuli file {plan.stimuli.path} is another one on {platform.node()}")
@@ -134,7 +134,7 @@ def run_point(
     point: Point,
     attend: Callable[[Rack], Callable[[], None]] | None = None,
     should_stop: Callable[[], bool] = lambda: False,
-) -> Outcome:
+) -> RunOutcome:
     """Run one point; any error becomes the outcome's fault, so that it ends no other run (decision).
 
     A run that a fault stops has no measures but ``errors`` and ``stopped`` (decision): STOP ALL clears the commons that
@@ -149,7 +149,7 @@ def run_point(
         why = fault.message
     except Exception as error:
         why = f"{type(error).__name__}: {error}"
-    return Outcome((None,) * len(plan.measures), printable(why))
+    return RunOutcome((None,) * len(plan.measures), printable(why))
 
 
 def _run(
@@ -157,7 +157,7 @@ def _run(
     beginning: Beginning,
     attend: Callable[[Rack], Callable[[], None]] | None,
     should_stop: Callable[[], bool],
-) -> Outcome:
+) -> RunOutcome:
     rack = plan.blueprint.rack(beginning.plants)
     stimulation = _stimulation(rack, plan.stimuli)
     for item in beginning.tunings:
@@ -175,7 +175,7 @@ def _run(
     values = watch.results(plan.duration_ns) if not fault else {}
     values.update((item, _of_rack(rack, item)) for item in plan.measures if not item.is_of_common)
     refused = next((line for line in stimulation.news()), "")
-    return Outcome(tuple(values.get(item) for item in plan.measures), fault or refused)
+    return RunOutcome(tuple(values.get(item) for item in plan.measures), fault or refused)
 
 
 def _pass(rack: Rack, plan: Plan, stimulation: StimuliPlayer, should_stop: Callable[[], bool]) -> None:
@@ -226,7 +226,7 @@ class Row:
 
     number: int
     point: Point
-    outcome: Outcome
+    outcome: RunOutcome
 
 
 def run_sweep(
@@ -273,7 +273,7 @@ def _rows(done: JobResult, first: int) -> Iterable[Row]:
     plan, points = done.piece.arguments
     outcomes = done.result
     if outcomes is None:
-        outcomes = [Outcome((None,) * len(plan.measures), str(done.fault))] * len(points)
+        outcomes = [RunOutcome((None,) * len(plan.measures), str(done.fault))] * len(points)
     for number, (point, outcome) in enumerate(zip(points, outcomes, strict=True), start=first + 1):
         yield Row(number, point, outcome)
 

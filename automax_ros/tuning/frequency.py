@@ -29,7 +29,7 @@ _LEFT = 1e-6
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredResponse:
     """The gain at one frequency: ``amplitude`` of the sine in counts, ``gain`` from it to OUTPUT.
 
     ``uncertainty`` is the greatest error that the rounding of OUTPUT can make, as a gain. ``touched`` lists the limits
@@ -74,14 +74,14 @@ class Sweep:
         self._amplitude = amplitude
         self._settling = settling_scans(transfer)
 
-    def measure(self, frequencies: Iterable[float]) -> list[Measured | None]:
+    def measure(self, frequencies: Iterable[float]) -> list[MeasuredResponse | None]:
         """Return the gain at each frequency in rad/s, above 0 and below Nyquist, in the order given.
 
         None means that it would take too many scans. The frequency measured at is the nearest with whole periods in the
         window, at most 1/1000 away.
         """
         wanted = list(frequencies)
-        found: dict[int, Measured | None] = {}
+        found: dict[int, MeasuredResponse | None] = {}
         left = MOST_SCANS_IN_ALL
         for place in sorted(range(len(wanted)), key=lambda number: -wanted[number]):
             turns, window = whole_periods(wanted[place], self._transfer.period_s)
@@ -93,7 +93,7 @@ class Sweep:
             found[place] = self._at(turns, window)
         return [found[place] for place in range(len(wanted))]
 
-    def _at(self, turns: int, window: int) -> Measured:
+    def _at(self, turns: int, window: int) -> MeasuredResponse:
         rad_s = 2.0 * math.pi * turns / (window * self._transfer.period_s)
         amplitude = self._amplitude or self._fitting_amplitude(rad_s)
         wave = whole_counts(amplitude, turns, window, window // 4 + turns * self._settling)
@@ -104,7 +104,7 @@ class Sweep:
         outputs = driven.run(wave)
         drift = (outputs[-1] - before) / window
         given, came = _components(wave, [value - drift * n for n, value in enumerate(outputs)], turns)
-        return Measured(
+        return MeasuredResponse(
             rad_s=rad_s,
             amplitude=amplitude,
             gain=came / given,

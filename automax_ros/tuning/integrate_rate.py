@@ -9,7 +9,7 @@ from automax_ros.blocks.declare.coefficients import TWO_TO_MINUS_18
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, stored_real
 from automax_ros.core.ticks import MAX_TICK_NS, MAX_TICKS, MIN_TICK_NS, NS_PER_S
 from automax_ros.core.user_error import UserError
-from automax_ros.tuning.tuning import IntegratorRange, Verdict, range_of, verdict_of
+from automax_ros.tuning.tuning import IntegratorRange, LimitVerdict, range_of, verdict_of
 
 RATE_FACTOR = (math.pi / 20.0) / math.tan(math.pi / 20.0)
 """KI x / y of section 42.3: 0.99176; the manual prints 0.99179."""
@@ -91,8 +91,8 @@ class Rate:
             return "\n".join(lines) + "\n"
         low, high = rate_limits(self.period_s)
         near = {
-            Verdict.NEAR_LOW: "  ! within 10 % of the low limit",
-            Verdict.NEAR_HIGH: "  ! within 10 % of the high limit",
+            LimitVerdict.NEAR_LOW: "  ! within 10 % of the low limit",
+            LimitVerdict.NEAR_HIGH: "  ! within 10 % of the high limit",
         }
         edge = (
             "" if found.near_edge is None else f"  ! Kx is within 10 % of {found.near_edge:g}, where the range changes"
@@ -126,7 +126,7 @@ class Rate:
             "counts_per_scan": None if self.period_s is None else self.y * self.period_s,
         }
 
-    def _verdict(self) -> Verdict:
+    def _verdict(self) -> LimitVerdict:
         limits = (None, None) if self.period_s is None else rate_limits(self.period_s)
         return verdict_of(stored_real(self.constant)[0], *limits)
 
@@ -138,10 +138,10 @@ class Rate:
             when = f"at T = {period_s * 1e3:g} ms"
             low, high = rate_limits(period_s)
         verdict = verdict_of(stored_real(self.constant)[0], low, high)
-        if verdict not in (Verdict.ABOVE, Verdict.BELOW):
+        if verdict not in (LimitVerdict.ABOVE, LimitVerdict.BELOW):
             return
         side = f"above its high limit {high:.6g} (0.9 pi / T)"
-        if verdict is Verdict.BELOW:
+        if verdict is LimitVerdict.BELOW:
             side = f"below its low limit {low:.6g} (C x 2**-18)"
         slow, fast = sorted(limit * self.x / RATE_FACTOR for limit in (low, high))
         raise RateFault(

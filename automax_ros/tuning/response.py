@@ -12,7 +12,7 @@ from automax_ros.blocks.declare.dynamics import Transfer
 from automax_ros.core.types import Value
 from automax_ros.tuning.dynamic_calls import DynamicCall
 from automax_ros.tuning.frequency import (
-    Measured,
+    MeasuredResponse,
     Sweep,
     first_phase,
     logarithmic,
@@ -29,7 +29,7 @@ _BETWEEN = 24
 
 
 @dataclass(frozen=True)
-class Range:
+class FrequencyRange:
     """Frequencies from ``low`` to ``high`` in rad/s."""
 
     low: float
@@ -38,7 +38,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Point:
+class FrequencyPoint:
     """One frequency: ``mark`` names a corner or WM there; ``measured`` is None if it would take too many scans.
 
     Gains are complex at ``rad_s``, phases in degrees without jumps.
@@ -46,7 +46,7 @@ class Point:
 
     rad_s: float
     mark: str
-    measured: Measured | None
+    measured: MeasuredResponse | None
     measured_deg: float | None
     design: complex
     design_deg: float
@@ -68,8 +68,8 @@ class BlockResponse:
     tuning: Tuning
     transfer: Transfer
     step: StepResponse
-    range: Range
-    points: tuple[Point, ...]
+    range: FrequencyRange
+    points: tuple[FrequencyPoint, ...]
     remarks: tuple[str, ...]
 
     @property
@@ -89,7 +89,7 @@ def measured_response(
     tuning: Tuning,
     period_ns: int,
     parameters: Mapping[str, Value],
-    frequencies: Range,
+    frequencies: FrequencyRange,
     amplitude: int | None,
     step: int | None,
     scans: int,
@@ -135,7 +135,7 @@ def followed(transfer: Transfer, frequencies: Sequence[float], *, laplace: bool)
     return [(gains[place], angles[place]) for place in places]
 
 
-def _frequencies(wanted: Range, tuning: Tuning) -> list[tuple[float, str]]:
+def _frequencies(wanted: FrequencyRange, tuning: Tuning) -> list[tuple[float, str]]:
     found = [(rad_s, "") for rad_s in logarithmic(wanted.low, wanted.high, wanted.points)]
     for name, rad_s in marked_frequencies(tuning):
         if not wanted.low * (1.0 - _SAME) <= rad_s <= wanted.high * (1.0 + _SAME):
@@ -147,7 +147,9 @@ def _frequencies(wanted: Range, tuning: Tuning) -> list[tuple[float, str]]:
     return sorted(found)
 
 
-def _points(transfer: Transfer, wanted: Sequence[tuple[float, str]], found: Sequence[Measured | None]) -> list[Point]:
+def _points(
+    transfer: Transfer, wanted: Sequence[tuple[float, str]], found: Sequence[MeasuredResponse | None]
+) -> list[FrequencyPoint]:
     """Return the points; the functions of a measured point hold at the very frequency of the measurement."""
     exact = [item.rad_s if item is not None else rad_s for (rad_s, _), item in zip(wanted, found, strict=True)]
     order = sorted(range(len(exact)), key=lambda place: exact[place])
@@ -160,7 +162,7 @@ def _points(transfer: Transfer, wanted: Sequence[tuple[float, str]], found: Sequ
         angle = None
         if measured is not None and measured.gain:
             angle = nearest_phase(math.degrees(cmath.phase(measured.gain)), design[1])
-        points.append(Point(exact[place], wanted[place][1], measured, angle, *design, *laplace))
+        points.append(FrequencyPoint(exact[place], wanted[place][1], measured, angle, *design, *laplace))
     return points
 
 

@@ -26,7 +26,7 @@ RANGE_EDGES = (0.125, 0.25)
 """The coefficients Kx at which the range of an integrator changes (section 51)."""
 
 
-class Verdict(enum.Enum):
+class LimitVerdict(enum.Enum):
     """Position of a value between its limits."""
 
     UNKNOWN = "unknown"
@@ -52,7 +52,7 @@ class LimitNow:
     high_text: str
     value: float | None
     given: bool
-    verdict: Verdict
+    verdict: LimitVerdict
     crossed: bool = False
 
 
@@ -105,7 +105,7 @@ class Ratio:
     value: float
     low: float
     high: float
-    verdict: Verdict
+    verdict: LimitVerdict
 
 
 @dataclass(frozen=True)
@@ -195,19 +195,19 @@ def tuning(block: Block, scan_s: float, given: Mapping[str, float | None]) -> Tu
     )
 
 
-def verdict_of(value: float, low: float | None, high: float | None) -> Verdict:
+def verdict_of(value: float, low: float | None, high: float | None) -> LimitVerdict:
     """Return the position of a value: near is within NEAR of a limit, on the limit's own scale; 0 has no scale.
 
     A limit that is not known (None) is not judged; UNKNOWN is a value that is neither beyond nor near the other.
     """
     if not is_within(value, -math.inf if low is None else low, math.inf if high is None else high):
-        return Verdict.ABOVE if high is not None and value > high else Verdict.BELOW
+        return LimitVerdict.ABOVE if high is not None and value > high else LimitVerdict.BELOW
     room = NEAR * (high - low) if low is not None and high is not None else math.inf
     if low is not None and low != 0.0 and value <= low + min(NEAR * abs(low), room):
-        return Verdict.NEAR_LOW
+        return LimitVerdict.NEAR_LOW
     if high is not None and value >= high - min(NEAR * abs(high), room):
-        return Verdict.NEAR_HIGH
-    return Verdict.UNKNOWN if low is None or high is None else Verdict.WITHIN
+        return LimitVerdict.NEAR_HIGH
+    return LimitVerdict.UNKNOWN if low is None or high is None else LimitVerdict.WITHIN
 
 
 def _limits(
@@ -223,20 +223,20 @@ def _limits(
             low = high
         value = known.get(limit.parameter)
         is_given = limit.parameter in given
-        verdict = Verdict.UNKNOWN
+        verdict = LimitVerdict.UNKNOWN
         if value is None:
             ends = range_within(limit, scan_s, in_force, -math.inf, math.inf)
             if ends is not None:
                 ranges[limit.parameter] = ends
         else:
-            verdict = verdict_of(value, low, high) if is_given else Verdict.WITHIN
-            if verdict is Verdict.UNKNOWN:
+            verdict = verdict_of(value, low, high) if is_given else LimitVerdict.WITHIN
+            if verdict is LimitVerdict.UNKNOWN:
                 beyond = verdict_of(value, *loose_bounds(limit, scan_s, in_force, ranges))
-                verdict = beyond if beyond in (Verdict.BELOW, Verdict.ABOVE) else verdict
+                verdict = beyond if beyond in (LimitVerdict.BELOW, LimitVerdict.ABOVE) else verdict
         # A limit that reads a parameter sees its limited value.
-        if verdict is Verdict.BELOW and low is not None:
+        if verdict is LimitVerdict.BELOW and low is not None:
             in_force[limit.parameter] = low
-        elif verdict is Verdict.ABOVE and high is not None:
+        elif verdict is LimitVerdict.ABOVE and high is not None:
             in_force[limit.parameter] = high
         rows.append(
             LimitNow(

@@ -9,7 +9,17 @@ import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE, Family
 from automax_ros.blocks.declare.coefficients import mapping_constant, no_defaults, per_period
-from automax_ros.blocks.declare.declaration import Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
+from automax_ros.blocks.declare.declaration import (
+    Block,
+    BlockTimes,
+    Coefficients,
+    Form,
+    Input,
+    Limit,
+    Output,
+    State,
+    Time,
+)
 from automax_ros.blocks.declare.dynamics import Dynamics, Integrator, corners_at, mapped
 from automax_ros.blocks.examples import Example
 from automax_ros.core.numbers import clamp16, round_count
@@ -67,7 +77,7 @@ ALL_PASS = Block(
             remarks=lambda _inputs: ["the gain is 1 at all frequencies"],
         ),
     ),
-    times=Times(Time(20.0), Time(80.0), Time(30.0), Time(14.0)),
+    times=BlockTimes(Time(20.0), Time(80.0), Time(30.0), Time(14.0)),
     notes=("It turns the phase and leaves the gain.",),
     step=all_pass_step,
 )

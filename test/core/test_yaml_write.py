@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.yaml_text import Mapping, Node, Scalar, Sequence, read_yaml, yaml_of
+from automax_ros.core.yaml_text import Node, Scalar, YamlMapping, YamlSequence, read_yaml, yaml_of
 
 CONFIGS = sorted((Path(__file__).parents[2] / "config").glob("**/*.yaml"))
 HERE = Span(1, 1, 2)
@@ -21,9 +21,9 @@ class _Null:
 
 def bare(node: Node) -> object:
     """Return a tree without places."""
-    if isinstance(node, Mapping):
+    if isinstance(node, YamlMapping):
         return [(bare(key), bare(value)) for key, value in node.entries]
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         return tuple(map(bare, node.items))
     return _Null() if node.is_null else (node.text, node.plain)
 
@@ -51,8 +51,8 @@ SCALARS = QUOTED | PLAIN | st.just(Scalar("", True, HERE))
 TREES = st.recursive(
     SCALARS,
     lambda inner: (
-        st.lists(inner, max_size=3).map(lambda items: Sequence(tuple(items), HERE))
-        | st.lists(st.tuples(PLAIN | QUOTED, inner), max_size=3).map(lambda items: Mapping(tuple(items), HERE))
+        st.lists(inner, max_size=3).map(lambda items: YamlSequence(tuple(items), HERE))
+        | st.lists(st.tuples(PLAIN | QUOTED, inner), max_size=3).map(lambda items: YamlMapping(tuple(items), HERE))
     ),
     max_leaves=12,
 )

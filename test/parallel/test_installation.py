@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from automax_ros.parallel import installation as module
-from automax_ros.parallel.installation import Installation, installation, results_digest
+from automax_ros.parallel.installation import WorkerInstallation, installation, results_digest
 
 
 def test_all_that_decides_on_results_is_told():
@@ -40,7 +40,7 @@ def test_the_last_bit_of_a_sum_by_numpy_is_seen(monkeypatch):
 
 
 def test_an_older_version_that_tells_less_is_unlike():
-    older = Installation.__new__(Installation)
+    older = WorkerInstallation.__new__(WorkerInstallation)
     vars(older).update(version="0.0.9", sources="0" * 64)
     assert older != installation()
     assert str(older) == "0.0.9 (sources 000000000000)"

@@ -20,6 +20,7 @@ from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.repair.repairing import RepairReport, repair
 from automax_ros.recordings.write.data_file import StorageOptions
 from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
+from automax_ros.recordings.write.writer import BagWriter
 from automax_ros.replay.engine import replay
 from automax_ros.replay.scans.stored_rack import SourceRefused
 from replay.replays import recorded
@@ -128,12 +129,16 @@ def test_a_sound_recording_is_sound_for_all(bag):
     assert repair(bag).sound
 
 
-def empty_recording(folder: Path, *, begins: bool) -> Path:
-    """A recording of a rack without tasks, or of one that was never activated."""
-    rack = build(folder, EMPTY_RACK if begins else EMPTY_RACK.replace("tick_ms: 5.5}", "tick_ms: 5.5}"))
+def empty_recording(folder: Path, of: str) -> Path:
+    """A recording of a rack without tasks, of one that was never activated, or one without a message."""
+    rack = build(folder) if of == "never activated" else build(folder, EMPTY_RACK)
+    if of == "nothing":
+        facts = {"rack": rack.config.name, "version": "0.1.0", "fingerprint": f"{rack.fingerprint:016x}"}
+        BagWriter(folder / "bag", custom_data=facts).close()
+        return folder / "bag"
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, folder / "bag")
-    if begins:
+    if of == "no tasks":
         stream.begin()
         rack.start()
         rack.run(0.1)
@@ -142,9 +147,11 @@ def empty_recording(folder: Path, *, begins: bool) -> Path:
     return folder / "bag"
 
 
-@pytest.mark.parametrize(("begins", "code"), [(True, "AMX6832"), (False, "AMX6820")])
-def test_what_replay_refuses_is_not_called_sound(tmp_path, begins, code):
-    bag = empty_recording(tmp_path, begins=begins)
+@pytest.mark.parametrize(
+    ("of", "code"), [("no tasks", "AMX6832"), ("never activated", "AMX6832"), ("nothing", "AMX6820")]
+)
+def test_what_replay_refuses_is_not_called_sound(tmp_path, of, code):
+    bag = empty_recording(tmp_path, of)
     assert checked(bag) == replayed(bag) == code
     report = repair(bag, tmp_path / "new")
     assert left(report) == checked(tmp_path / "new") == code

@@ -11,7 +11,7 @@ from automax_ros.parallel.job import Workers
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.sweep.points import grid, read_varied
-from automax_ros.sweep.run import Outcome, Stimuli, best_rows, run_point, run_points, run_sweep
+from automax_ros.sweep.run import RunOutcome, Stimuli, best_rows, run_point, run_points, run_sweep
 from sweep.helpers import plan_of, rack_in
 
 DRIVE = Path(__file__).parents[2] / "config" / "dc_drive" / "rack.yaml"
@@ -125,7 +125,7 @@ def test_an_error_of_ours_is_the_fault_of_its_run_alone(rack: Rack, monkeypatch:
     monkeypatch.setattr(Rack, "start", failing)
     assert run_points(plan, points) == [
         expected[0],
-        Outcome((None,), "ZeroDivisionError: in\N{REPLACEMENT CHARACTER}side"),
+        RunOutcome((None,), "ZeroDivisionError: in\N{REPLACEMENT CHARACTER}side"),
         expected[2],
     ]
 

@@ -14,7 +14,7 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.tuning import frequency
 from automax_ros.tuning.driven import DrivenBlock
 from automax_ros.tuning.frequency import (
-    Measured,
+    MeasuredResponse,
     Sweep,
     decibels,
     first_phase,
@@ -336,11 +336,11 @@ def test_same_measurement_every_time():
 
 
 def test_uncertainty_in_db_and_degrees():
-    point = Measured(1.0, 100, complex(0.0, 0.1), 0.05, ())
+    point = MeasuredResponse(1.0, 100, complex(0.0, 0.1), 0.05, ())
     assert point.uncertainty_db == pytest.approx(20 * math.log10(1.5))
     assert point.uncertainty_deg == pytest.approx(30.0)
     assert not point.reliable
-    nothing = Measured(1.0, 100, 0j, 0.005, ())
+    nothing = MeasuredResponse(1.0, 100, 0j, 0.005, ())
     assert (nothing.uncertainty_db, nothing.uncertainty_deg, nothing.reliable) == (math.inf, 180.0, False)
     assert decibels(0j) is None
 

@@ -11,7 +11,7 @@ from scipy import optimize, signal
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.tuning.integrate_rate import RATE_FACTOR, Rate, RateFault, rate_gain, rate_limits
 from automax_ros.tuning.tuning import (
-    Verdict,
+    LimitVerdict,
     range_of,
     tuning,
     verdict_of,
@@ -57,15 +57,15 @@ def test_limits_of_the_other_blocks():
 @pytest.mark.parametrize(
     ("value", "verdict"),
     [
-        (0.9999, Verdict.BELOW),
-        (1.0, Verdict.NEAR_LOW),
-        (1.0999, Verdict.NEAR_LOW),
-        (1.11, Verdict.WITHIN),
-        (50.0, Verdict.WITHIN),
-        (89.9, Verdict.WITHIN),
-        (90.2, Verdict.NEAR_HIGH),
-        (100.0, Verdict.NEAR_HIGH),
-        (100.1, Verdict.ABOVE),
+        (0.9999, LimitVerdict.BELOW),
+        (1.0, LimitVerdict.NEAR_LOW),
+        (1.0999, LimitVerdict.NEAR_LOW),
+        (1.11, LimitVerdict.WITHIN),
+        (50.0, LimitVerdict.WITHIN),
+        (89.9, LimitVerdict.WITHIN),
+        (90.2, LimitVerdict.NEAR_HIGH),
+        (100.0, LimitVerdict.NEAR_HIGH),
+        (100.1, LimitVerdict.ABOVE),
     ],
 )
 def test_near_is_within_a_tenth_of_the_limit(value, verdict):
@@ -74,23 +74,23 @@ def test_near_is_within_a_tenth_of_the_limit(value, verdict):
 
 def test_near_between_close_limits_is_a_tenth_of_the_room_and_zero_has_no_scale():
     assert [verdict_of(value, 110.0, 124.0) for value in (111.0, 114.0, 123.0)] == [
-        Verdict.NEAR_LOW,
-        Verdict.WITHIN,
-        Verdict.NEAR_HIGH,
+        LimitVerdict.NEAR_LOW,
+        LimitVerdict.WITHIN,
+        LimitVerdict.NEAR_HIGH,
     ]
-    assert verdict_of(0.0, 0.0, 1e18) is Verdict.WITHIN
+    assert verdict_of(0.0, 0.0, 1e18) is LimitVerdict.WITHIN
 
 
 @pytest.mark.parametrize(
     ("value", "low", "high", "verdict"),
     [
-        (1.0, None, 2.0, Verdict.UNKNOWN),
-        (1.9, None, 2.0, Verdict.NEAR_HIGH),
-        (2.1, None, 2.0, Verdict.ABOVE),
-        (5.0, 2.0, None, Verdict.UNKNOWN),
-        (2.1, 2.0, None, Verdict.NEAR_LOW),
-        (1.9, 2.0, None, Verdict.BELOW),
-        (1.9, None, None, Verdict.UNKNOWN),
+        (1.0, None, 2.0, LimitVerdict.UNKNOWN),
+        (1.9, None, 2.0, LimitVerdict.NEAR_HIGH),
+        (2.1, None, 2.0, LimitVerdict.ABOVE),
+        (5.0, 2.0, None, LimitVerdict.UNKNOWN),
+        (2.1, 2.0, None, LimitVerdict.NEAR_LOW),
+        (1.9, 2.0, None, LimitVerdict.BELOW),
+        (1.9, None, None, LimitVerdict.UNKNOWN),
     ],
 )
 def test_each_side_that_is_known_is_judged(value, low, high, verdict):
@@ -100,11 +100,11 @@ def test_each_side_that_is_known_is_judged(value, low, high, verdict):
 @pytest.mark.parametrize(
     ("wld", "verdict"),
     [
-        (1e6, Verdict.ABOVE),
-        (125.0, Verdict.NEAR_HIGH),
-        (-5.0, Verdict.BELOW),
-        (1e-6, Verdict.BELOW),
-        (1e-5, Verdict.UNKNOWN),
+        (1e6, LimitVerdict.ABOVE),
+        (125.0, LimitVerdict.NEAR_HIGH),
+        (-5.0, LimitVerdict.BELOW),
+        (1e-6, LimitVerdict.BELOW),
+        (1e-5, LimitVerdict.UNKNOWN),
     ],
 )
 def test_value_beside_one_that_is_not_known_is_judged_as_far_as_that_goes(wld, verdict):
@@ -122,15 +122,18 @@ def test_limits_that_cross_leave_the_high_one():
 def test_a_real_nearest_to_a_limit_is_the_limit():
     """WLG = 0.71 C of 24 bits may lie above 0.71 C, and is taken."""
     high = limits_of("LAG", 0.022, WLG=1.0)["WLG"].high
-    assert limits_of("LAG", 0.022, WLG=float(f"{high:.9g}"))["WLG"].verdict in (Verdict.NEAR_HIGH, Verdict.ABOVE)
-    assert limits_of("LAG", 0.022, WLG=high)["WLG"].verdict is Verdict.NEAR_HIGH
+    assert limits_of("LAG", 0.022, WLG=float(f"{high:.9g}"))["WLG"].verdict in (
+        LimitVerdict.NEAR_HIGH,
+        LimitVerdict.ABOVE,
+    )
+    assert limits_of("LAG", 0.022, WLG=high)["WLG"].verdict is LimitVerdict.NEAR_HIGH
 
 
 def test_value_that_is_not_known_leaves_the_limits():
     found = tuning(CATALOGUE["PROP_INT"], 0.022, {"KP": 2.0, "WLD": None})
     assert (found.missing, found.transfer, found.corners, found.integrator) == (("WLD",), None, (), None)
     by_name = {item.parameter: item for item in found.limits}
-    assert by_name["WLD"].verdict is Verdict.UNKNOWN
+    assert by_name["WLD"].verdict is LimitVerdict.UNKNOWN
     assert by_name["WLD"].low == pytest.approx(2**-18 / 2.0 * mapping_constant(0.022))
     found = tuning(CATALOGUE["PROP_INT"], 0.022, {"KP": None, "WLD": 1.0})
     by_name = {item.parameter: item for item in found.limits}
@@ -142,7 +145,7 @@ def test_variable_beyond_its_limits_is_shown_with_the_limit_in_force():
     found = tuning(CATALOGUE["LAG"], 0.022, {"WLG": 500.0})
     assert found.moved == ("WLG",)
     assert found.values["WLG"] == pytest.approx(256.055 / 4, rel=1e-4)
-    assert [item.verdict for item in found.limits] == [Verdict.WITHIN, Verdict.ABOVE]
+    assert [item.verdict for item in found.limits] == [LimitVerdict.WITHIN, LimitVerdict.ABOVE]
     block = run("LAG", 22_000_000)
     block.scan(input=0, wlg=500.0)
     assert found.coefficients == block.coefficients
@@ -151,12 +154,12 @@ def test_variable_beyond_its_limits_is_shown_with_the_limit_in_force():
 @pytest.mark.parametrize(
     ("wld", "wlg", "verdict"),
     [
-        (1.0, 2.1, Verdict.NEAR_LOW),
-        (2.1, 1.0, Verdict.NEAR_LOW),
-        (1.0, 5.0, Verdict.WITHIN),
-        (19.0, 1.0, Verdict.NEAR_HIGH),
-        (1.0, 21.0, Verdict.ABOVE),
-        (1.0, 1.5, Verdict.BELOW),
+        (1.0, 2.1, LimitVerdict.NEAR_LOW),
+        (2.1, 1.0, LimitVerdict.NEAR_LOW),
+        (1.0, 5.0, LimitVerdict.WITHIN),
+        (19.0, 1.0, LimitVerdict.NEAR_HIGH),
+        (1.0, 21.0, LimitVerdict.ABOVE),
+        (1.0, 1.5, LimitVerdict.BELOW),
     ],
 )
 def test_ratio_of_lead_lag(wld, wlg, verdict):
@@ -164,7 +167,7 @@ def test_ratio_of_lead_lag(wld, wlg, verdict):
     found = tuning(CATALOGUE["LEAD_LAG"], 0.0055, {"WLD": wld, "WLG": wlg})
     assert found.ratio.value == pytest.approx(max(wld, wlg) / min(wld, wlg))
     assert found.ratio.verdict is verdict
-    assert (found.moved == ()) is (verdict not in (Verdict.ABOVE, Verdict.BELOW))
+    assert (found.moved == ()) is (verdict not in (LimitVerdict.ABOVE, LimitVerdict.BELOW))
 
 
 @pytest.mark.parametrize(
@@ -264,7 +267,7 @@ def test_corner_of_thermal_overload():
     assert found.transfer.b[0] == pytest.approx(found.coefficients["gain"])
     assert -found.transfer.a[1] == pytest.approx(1.0 - 2.0 * found.coefficients["gain"])
     beyond = tuning(CATALOGUE["THERMAL_OVERLOAD"], 0.01, {**given, "LIM_BAR": 500.0})
-    assert {item.parameter: item.verdict for item in beyond.limits}["LIM_BAR"] is Verdict.ABOVE
+    assert {item.parameter: item.verdict for item in beyond.limits}["LIM_BAR"] is LimitVerdict.ABOVE
     assert beyond.values["LIM_BAR"] == 400.0
 
 

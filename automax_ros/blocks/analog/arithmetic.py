@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declare.declaration import CLAMPED, DIVIDED_BY_ZERO, Block, Form, Input, Output, Time, Times
+from automax_ros.blocks.declare.declaration import (
+    CLAMPED,
+    DIVIDED_BY_ZERO,
+    Block,
+    BlockTimes,
+    Form,
+    Input,
+    Output,
+    Time,
+)
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
 
@@ -22,7 +31,7 @@ ABSOLUTE_VALUE = Block(
     function="OUTPUT = |INPUT|",
     inputs=(Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE),),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the magnitude; of -32768 it is 32767"),),
-    times=Times(Time(9.16), Time(41.0), Time(8.30), Time(6.44)),
+    times=BlockTimes(Time(9.16), Time(41.0), Time(8.30), Time(6.44)),
     step=absolute_value_step,
 )
 
@@ -47,7 +56,7 @@ INVERTER = Block(
         Input.integer("INPUT", "I", "signal input", form=Form.VARIABLE),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "INPUT, with the other sign while ENABLE; -(-32768) is 32767"),),
-    times=Times(Time(10.84), Time(48.0), Time(9.40), Time(7.60)),
+    times=BlockTimes(Time(10.84), Time(48.0), Time(9.40), Time(7.60)),
     step=inverter_step,
 )
 
@@ -73,7 +82,7 @@ DIFFERENCE = Block(
     inputs=(Input.integer("INPUT1", "I1", "signal input 1"), Input.integer("INPUT2", "I2", "signal input 2")),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the difference, limited to -32768 to +32767"),),
     logs=("AMX7001",),
-    times=Times(Time(10.80), Time(44.0), Time(7.97), Time(7.56)),
+    times=BlockTimes(Time(10.80), Time(44.0), Time(7.97), Time(7.56)),
     step=difference_step,
 )
 
@@ -99,7 +108,7 @@ SUMMER = Block(
     inputs=(Input.integer("INPUT1", "I1", "signal input 1"), Input.integer("INPUT2", "I2", "signal input 2")),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the sum, limited to -32768 to +32767"),),
     logs=("AMX7001",),
-    times=Times(Time(11.28), Time(44.0), Time(10.00), Time(7.88)),
+    times=BlockTimes(Time(11.28), Time(44.0), Time(10.00), Time(7.88)),
     step=summer_step,
 )
 
@@ -142,7 +151,7 @@ MULTIPLY_DIVIDE = Block(
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the quotient, limited to -32768 to +32767"),),
     logs=("AMX7003",),
-    times=Times(Time(13.76), Time(71.0), Time(13.80), Time(9.64)),
+    times=BlockTimes(Time(13.76), Time(71.0), Time(13.80), Time(9.64)),
     notes=(
         "The quotient truncates toward zero. The clamp is not logged.",
         "Division by zero is logged and gives the clamp of the product's sign, 0/0 gives 0.",

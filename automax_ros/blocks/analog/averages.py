@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, State, Time, Times
+from automax_ros.blocks.declare.declaration import Block, BlockTimes, Form, Input, Output, State, Time
 from automax_ros.blocks.declare.rules import ForcedUp, Storage
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType, Value
@@ -83,7 +83,7 @@ RUNNING_AVERAGE = Block(
         State("lowest", DataType.INTEGER, INT16_MAX),
     ),
     rules=(Storage("REQUIRED_SAMPLES"),),
-    times=Times(Time(28.64), Time(125.0), Time(26.94), Time(20.04)),
+    times=BlockTimes(Time(28.64), Time(125.0), Time(26.94), Time(20.04)),
     notes=("Samples not yet taken count as 0, so OUTPUT rises to the average while DATA_VALID is FALSE.",),
     step=running_average_step,
 )
@@ -181,7 +181,7 @@ SAMPLED_AVERAGE = Block(
         State("shown_lowest", DataType.INTEGER, INT16_MAX),
     ),
     rules=(ForcedUp("REQUIRED_SAMPLES", 1),),
-    times=Times(Time(29.00), Time(125.0), Time(25.94), Time(20.32)),
+    times=BlockTimes(Time(29.00), Time(125.0), Time(25.94), Time(20.32)),
     notes=("The first update comes on scan REQUIRED_SAMPLES. Between updates the outputs keep their values.",),
     step=sampled_average_step,
 )

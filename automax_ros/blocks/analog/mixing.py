@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 from automax_ros.blocks.declare.channels import MOST_CHANNELS, input_channels, paired
-from automax_ros.blocks.declare.declaration import CLAMPED, DIVIDED_BY_ZERO, OVERFLOW, Block, Input, Output, Time, Times
+from automax_ros.blocks.declare.declaration import (
+    CLAMPED,
+    DIVIDED_BY_ZERO,
+    OVERFLOW,
+    Block,
+    BlockTimes,
+    Input,
+    Output,
+    Time,
+)
 from automax_ros.blocks.declare.rules import Contiguous
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN
 from automax_ros.core.types import DataType
@@ -89,7 +98,7 @@ AMPLIFIER = Block(
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the scaled sum, limited to -32768 to +32767"),),
     rules=(Contiguous(("INPUT", "GAIN"), MOST_CHANNELS),),
     logs=("AMX7001", "AMX7002", "AMX7003"),
-    times=Times(Time(13.16, k=3.12), Time(62.0, k=13.8), Time(15.30, k=1.80), Time(9.2, k=2.20)),
+    times=BlockTimes(Time(13.16, k=3.12), Time(62.0, k=13.8), Time(15.30, k=1.80), Time(9.2, k=2.20)),
     notes=(
         "The order in which the pairs are written does not matter.",
         "Once the sum leaves 32 bits the channels that follow are ignored, and OUTPUT is the clamp of the sum's sign.",
@@ -157,7 +166,7 @@ SELECT = Block(
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the sum, limited to -32768 to +32767; 0 if none is selected"),),
     rules=(Contiguous(("INPUT", "SELECT"), MOST_CHANNELS),),
     logs=("AMX7001",),
-    times=Times(Time(11.36, j=2.52), Time(44.0, j=12.2), Time(12.50, j=1.50), Time(7.96, j=1.76)),
+    times=BlockTimes(Time(11.36, j=2.52), Time(44.0, j=12.2), Time(12.50, j=1.50), Time(7.96, j=1.76)),
     notes=("The order in which the pairs are written does not matter.",),
     step=select_step,
 )

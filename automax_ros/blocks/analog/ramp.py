@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, State, Time, Times
+from automax_ros.blocks.declare.declaration import Block, BlockTimes, Form, Input, Output, State, Time
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.types import DataType
 
@@ -93,7 +93,7 @@ RAMP = Block(
         Output("RATE", DataType.INTEGER, "RATE", "change of OUTPUT x SCALE in this scan", required=False),
     ),
     states=(State("register", DataType.INTEGER, 0),),
-    times=Times(Time(27.72), Time(122.0), Time(24.96), Time(19.40)),
+    times=BlockTimes(Time(27.72), Time(122.0), Time(24.96), Time(19.40)),
     notes=(
         "A rate of 0 holds the ramp in that direction.",
         "The rate in counts/s is rate / SCALE / T: at 5.5 ms from 0.00554882 to 5957636.4.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declare.declaration import CLAMPED, Block, Form, Input, Output, State, Time, Times
+from automax_ros.blocks.declare.declaration import CLAMPED, Block, BlockTimes, Form, Input, Output, State, Time
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
 
@@ -128,7 +128,7 @@ S_CURVE = Block(
     ),
     states=(State("register", DataType.INTEGER, 0), State("speed", DataType.INTEGER, 0)),
     logs=("AMX7001",),
-    times=Times(Time(47.00), Time(282.0), Time(35.01), Time(32.92)),
+    times=BlockTimes(Time(47.00), Time(282.0), Time(35.01), Time(32.92)),
     notes=(
         "A rate of 0 holds the curve in that direction.",
         "A move of D counts takes D / ACCEL + ACCEL / JERK scans, or 2 x sqrt(D / JERK) if ACCEL is not reached.",

@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 from automax_ros.blocks.declare.channels import MOST_CHANNELS, input_channels, output_channels
-from automax_ros.blocks.declare.declaration import CLAMPED, DIVIDED_BY_ZERO, Block, Form, Input, Output, Time, Times
+from automax_ros.blocks.declare.declaration import (
+    CLAMPED,
+    DIVIDED_BY_ZERO,
+    Block,
+    BlockTimes,
+    Form,
+    Input,
+    Output,
+    Time,
+)
 from automax_ros.blocks.declare.rules import Contiguous
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
@@ -34,7 +43,7 @@ LIMIT = Block(
         Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),
         Output("OUTPUT", DataType.INTEGER, "O", "the limited signal"),
     ),
-    times=Times(Time(18.20), Time(69.0), Time(15.05), Time(12.76)),
+    times=BlockTimes(Time(18.20), Time(69.0), Time(15.05), Time(12.76)),
     notes=("Where LIMIT_PLUS lies below LIMIT_MINUS, OUTPUT is LIMIT_PLUS.",),
     step=limit_step,
 )
@@ -94,7 +103,7 @@ SCALE = Block(
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the scaled signal, limited to -32768 to +32767"),),
     logs=("AMX7001", "AMX7003"),
-    times=Times(Time(22.48), Time(98.0), Time(18.30), Time(15.72)),
+    times=BlockTimes(Time(22.48), Time(98.0), Time(18.30), Time(15.72)),
     notes=(
         "The quotient truncates toward zero before OUTPUT_IMIN is added.",
         "INPUT_MAX equal to INPUT_MIN logs a division by zero; OUTPUT is then 32767, -32768 or 0.",
@@ -120,7 +129,7 @@ SWITCH = Block(
         Input.boolean("SELECT", "SE", "signal select"),
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the selected signal"),),
-    times=Times(Time(11.52), Time(47.0), Time(12.55), Time(8.08)),
+    times=BlockTimes(Time(11.52), Time(47.0), Time(12.55), Time(8.08)),
     step=switch_step,
 )
 
@@ -152,7 +161,7 @@ MOVE = Block(
     ),
     outputs=output_channels("OUTPUT", MOST_CHANNELS, DataType.INTEGER, "O", "data output", required=1, holds=True),
     rules=(Contiguous(("INPUT", "OUTPUT"), MOST_CHANNELS),),
-    times=Times(Time(10.40, p=2.32), Time(39.0, p=11.0), Time(10.40, p=1.80), Time(7.28, p=1.64)),
+    times=BlockTimes(Time(10.40, p=2.32), Time(39.0, p=11.0), Time(10.40, p=1.80), Time(7.28, p=1.64)),
     notes=(
         "The block has no copy of its own: an output forced and released while ENABLE is FALSE keeps the forced value.",
         "The order in which the pairs are written does not matter.",

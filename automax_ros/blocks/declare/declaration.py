@@ -330,7 +330,7 @@ class Time:
 
 
 @dataclass(frozen=True)
-class Times:
+class BlockTimes:
     """Execution times by Processor: 7010 (57C435), 6010/6011 (57C430A, 57C431), UDC, PC3000; None: cannot run it."""
 
     model_7010: Time | None
@@ -375,7 +375,7 @@ class Block:
     function: str
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
-    times: Times
+    times: BlockTimes
     step: Step | None
     states: tuple[State, ...] = ()
     coefficients: Coefficients | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.blocks.declare.channels import input_channels, names, output_channels
-from automax_ros.blocks.declare.declaration import NOT_ON_UDC, Block, Input, Output, Time, Times
+from automax_ros.blocks.declare.declaration import NOT_ON_UDC, Block, BlockTimes, Input, Output, Time
 from automax_ros.blocks.declare.rules import AtLeast
 from automax_ros.core.types import DataType
 
@@ -63,7 +63,7 @@ BIT_SELECT = Block(
     ),
     outputs=output_channels("OUTPUT", BITS, DataType.BOOLEAN, "O", "data output", required=0, first=0),
     rules=(AtLeast(1, names("OUTPUT", BITS, 0), "outputs"),),
-    times=Times(Time(26.04, n=1.20), Time(118.0, n=6.5), None, Time(18.24, n=0.84)),
+    times=BlockTimes(Time(26.04, n=1.20), Time(118.0, n=6.5), None, Time(18.24, n=0.84)),
     runs_on=NOT_ON_UDC,
     notes=("Only the outputs that are needed are programmed, in any order.",),
     step=bit_select_step,
@@ -135,7 +135,7 @@ PACK_BITS = Block(
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the number; bit 15 makes it negative"),),
     rules=(AtLeast(1, names("INPUT", BITS, 0), "inputs"),),
-    times=Times(Time(24.28, j=1.44), Time(110.0, j=5.0), Time(16.16, j=1.25), Time(17.00, j=1.00)),
+    times=BlockTimes(Time(24.28, j=1.44), Time(110.0, j=5.0), Time(16.16, j=1.25), Time(17.00, j=1.00)),
     notes=("Only the inputs that are needed are programmed, in any order.",),
     step=pack_bits_step,
 )
@@ -189,7 +189,7 @@ UNPACK_BITS = Block(
     inputs=(Input.integer("INPUT", "I", "signal input"),),
     outputs=output_channels("OUTPUT", BITS, DataType.BOOLEAN, "O", "data output for bit", required=0, first=0),
     rules=(AtLeast(1, names("OUTPUT", BITS, 0), "outputs"),),
-    times=Times(Time(23.40, n=1.44), Time(106.0, n=7.3), Time(14.40, n=1.90), Time(16.40, n=1.00)),
+    times=BlockTimes(Time(23.40, n=1.44), Time(106.0, n=7.3), Time(14.40, n=1.90), Time(16.40, n=1.00)),
     notes=("Only the outputs that are needed are programmed, in any order.",),
     step=unpack_bits_step,
 )

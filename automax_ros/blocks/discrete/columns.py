@@ -11,12 +11,12 @@ from automax_ros.blocks.declare.declaration import (
     NOT_ON_UDC,
     Access,
     Block,
+    BlockTimes,
     Input,
     Output,
     Special,
     Step,
     Time,
-    Times,
 )
 from automax_ros.blocks.declare.rules import AtLeast
 from automax_ros.core.types import DataType
@@ -165,7 +165,7 @@ def write_words_step(
 _SHIFTED = "Only channels that the SHIFT block programs may be programmed, in any order."
 
 
-def _block(name: str, section: str, step: Step, times: Times) -> Block:
+def _block(name: str, section: str, step: Step, times: BlockTimes) -> Block:
     """Return the block that reads or writes columns of booleans or of words, as its name says."""
     kind, structure = (DataType.BOOLEAN, Special.BITS) if name.endswith("BITS") else (DataType.INTEGER, Special.WORDS)
     reads = name.startswith("READ")
@@ -211,14 +211,17 @@ def _block(name: str, section: str, step: Step, times: Times) -> Block:
 
 
 READ_BITS = _block(
-    "READ_BITS", "23", read_bits_step, Times(Time(24.32, n=1.12), Time(106.0, n=7.3), None, Time(17.04, n=0.80))
+    "READ_BITS", "23", read_bits_step, BlockTimes(Time(24.32, n=1.12), Time(106.0, n=7.3), None, Time(17.04, n=0.80))
 )
 READ_WORDS = _block(
-    "READ_WORDS", "24", read_words_step, Times(Time(25.76, n=1.28), Time(111.0, n=5.6), None, Time(18.04, n=0.92))
+    "READ_WORDS", "24", read_words_step, BlockTimes(Time(25.76, n=1.28), Time(111.0, n=5.6), None, Time(18.04, n=0.92))
 )
 WRITE_BITS = _block(
-    "WRITE_BITS", "39", write_bits_step, Times(Time(25.56, j=1.36), Time(103.0, j=6.0), None, Time(17.88, j=0.96))
+    "WRITE_BITS", "39", write_bits_step, BlockTimes(Time(25.56, j=1.36), Time(103.0, j=6.0), None, Time(17.88, j=0.96))
 )
 WRITE_WORDS = _block(
-    "WRITE_WORDS", "40", write_words_step, Times(Time(25.52, j=0.36), Time(110.0, j=1.9), None, Time(17.88, j=0.28))
+    "WRITE_WORDS",
+    "40",
+    write_words_step,
+    BlockTimes(Time(25.52, j=0.36), Time(110.0, j=1.9), None, Time(17.88, j=0.28)),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, Time, Times
+from automax_ros.blocks.declare.declaration import Block, BlockTimes, Form, Input, Output, Time
 from automax_ros.blocks.declare.rules import AtLeast
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
@@ -38,7 +38,7 @@ ALARM = Block(
         Output("ALARM_LOW_LOW", DataType.BOOLEAN, "ALL", "INPUT <= LOW_LOW_LIMIT", required=False),
     ),
     rules=(AtLeast(1, ("ALARM_HIGH", "ALARM_LOW", "ALARM_HIGH_HIGH", "ALARM_LOW_LOW"), "outputs"),),
-    times=Times(Time(11.16, n=2.48), Time(44.0, n=11.0), Time(10.10, n=1.80), Time(7.8, n=1.76)),
+    times=BlockTimes(Time(11.16, n=2.48), Time(44.0, n=11.0), Time(10.10, n=1.80), Time(7.8, n=1.76)),
     notes=("With the default limits an alarm still comes at 32767 or -32768.",),
     step=alarm_step,
 )
@@ -64,6 +64,6 @@ COMPARE = Block(
         Output("OUTPUT_LES", DataType.BOOLEAN, "LT", "INPUT1 < INPUT2", required=False),
     ),
     rules=(AtLeast(1, ("OUTPUT_GTR", "OUTPUT_EQU", "OUTPUT_LES"), "outputs"),),
-    times=Times(Time(11.24, n=1.16), Time(45.0, n=5.5), Time(7.50, n=2.25), Time(7.88, n=0.80)),
+    times=BlockTimes(Time(11.24, n=1.16), Time(45.0, n=5.5), Time(7.50, n=2.25), Time(7.88, n=0.80)),
     step=compare_step,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.blocks.declare.channels import MOST_CHANNELS, input_channels
-from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, State, Time, Times
+from automax_ros.blocks.declare.declaration import Block, BlockTimes, Form, Input, Output, State, Time
 from automax_ros.blocks.declare.rules import AtLeast, Contiguous
 from automax_ros.core.types import DataType
 
@@ -24,7 +24,7 @@ AND = Block(
     inputs=input_channels("INPUT", MOST_CHANNELS, DataType.BOOLEAN, "I", "signal input", required=1, unused=True),
     outputs=(Output("OUTPUT", DataType.BOOLEAN, "O", "TRUE if all inputs programmed are TRUE"),),
     rules=(Contiguous(("INPUT",), MOST_CHANNELS),),
-    times=Times(Time(10.80, j=1.88), Time(41.0, j=8.3), Time(10.60, j=1.45), Time(7.56, j=1.32)),
+    times=BlockTimes(Time(10.80, j=1.88), Time(41.0, j=8.3), Time(10.60, j=1.45), Time(7.56, j=1.32)),
     step=and_step,
 )
 
@@ -45,7 +45,7 @@ OR = Block(
     inputs=input_channels("INPUT", MOST_CHANNELS, DataType.BOOLEAN, "I", "signal input", required=1, unused=False),
     outputs=(Output("OUTPUT", DataType.BOOLEAN, "O", "TRUE if any of the inputs programmed is TRUE"),),
     rules=(Contiguous(("INPUT",), MOST_CHANNELS),),
-    times=Times(Time(10.24, j=1.88), Time(41.0, j=8.3), Time(8.90, j=1.45), Time(7.16, j=1.32)),
+    times=BlockTimes(Time(10.24, j=1.88), Time(41.0, j=8.3), Time(8.90, j=1.45), Time(7.16, j=1.32)),
     step=or_step,
 )
 
@@ -70,7 +70,7 @@ LATCH = Block(
     ),
     outputs=(Output("OUTPUT", DataType.BOOLEAN, "O", "data output", holds=True),),
     rules=(AtLeast(2, ("RESET", "SET", "CLOCK", "INPUT"), "inputs"),),
-    times=Times(Time(15.04), Time(68.0), Time(14.85), Time(10.52)),
+    times=BlockTimes(Time(15.04), Time(68.0), Time(14.85), Time(10.52)),
     notes=("CLOCK is a level, not an edge. The latch has no copy of its own: an unchanged OUTPUT is not written.",),
     step=latch_step,
 )
@@ -91,7 +91,7 @@ TRANSITION = Block(
     inputs=(Input.boolean("INPUT", "I", "signal input", form=Form.VARIABLE),),
     outputs=(Output("OUTPUT", DataType.BOOLEAN, "O", "TRUE for one scan"),),
     states=(State("last", DataType.BOOLEAN, False),),
-    times=Times(Time(11.36), Time(48.0), Time(11.90), Time(7.96)),
+    times=BlockTimes(Time(11.36), Time(48.0), Time(11.90), Time(7.96)),
     notes=("INPUT counts as FALSE before the first scan: one that is on then gives TRUE on the first scan.",),
     step=transition_step,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declare.declaration import OVERFLOW, Block, Form, Input, Output, State, Time, Times
+from automax_ros.blocks.declare.declaration import OVERFLOW, Block, BlockTimes, Form, Input, Output, State, Time
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN
 from automax_ros.core.types import DataType
 
@@ -84,7 +84,7 @@ PULSE_MULT = Block(
         State("was_reset", DataType.BOOLEAN, False),
         State("remainder", DataType.INTEGER, 0),
     ),
-    times=Times(Time(18.32), Time(86.0), Time(18.96), Time(12.84)),
+    times=BlockTimes(Time(18.32), Time(86.0), Time(18.96), Time(12.84)),
     notes=(
         "A gain of exactly 1 is reached only by not programming MULTIPLIER.",
         "Relative mode gives 0 on its first scan unless RESET was TRUE before.",
@@ -133,7 +133,7 @@ COUNTER = Block(
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the count, limited to -32768 to +32767"),),
     states=(State("count", DataType.DOUBLE, 0),),
     logs=("AMX7002",),
-    times=Times(Time(15.64), Time(61.0), Time(16.90), Time(10.96)),
+    times=BlockTimes(Time(15.64), Time(61.0), Time(16.90), Time(10.96)),
     notes=("The count has 32 bits and stops at their limits, which is logged; the clamp of OUTPUT loses no counts.",),
     step=counter_step,
 )

@@ -14,13 +14,13 @@ from automax_ros.blocks.declare.declaration import (
     NOT_ON_UDC,
     Access,
     Block,
+    BlockTimes,
     Form,
     Input,
     Output,
     Special,
     State,
     Time,
-    Times,
 )
 from automax_ros.blocks.declare.rules import Contiguous, Storage
 from automax_ros.core.numbers import INT16_MAX
@@ -164,7 +164,7 @@ SHIFT_BITS = Block(
     rules=(Contiguous(("INPUT", "OUTPUT"), MOST_CHANNELS),),
     structure=Access.MAKES,
     runs_on=NOT_ON_UDC,
-    times=Times(Time(18.28, p=2.04), Time(92.0, p=19.7), None, Time(12.80, p=1.44)),
+    times=BlockTimes(Time(18.28, p=2.04), Time(92.0, p=19.7), None, Time(12.80, p=1.44)),
     notes=(*_NOTES, "The data structure takes MAX_COLUMNS bytes."),
     step=shift_bits_step,
 )
@@ -251,7 +251,7 @@ SHIFT_WORDS = Block(
     rules=(Contiguous(("INPUT", "OUTPUT"), MOST_CHANNELS), Storage("MAX_COLUMNS", per="INPUT")),
     structure=Access.MAKES,
     runs_on=NOT_ON_UDC,
-    times=Times(Time(17.80, p=1.72), Time(89.0, p=13.3), None, Time(12.48, p=1.20)),
+    times=BlockTimes(Time(17.80, p=1.72), Time(89.0, p=13.3), None, Time(12.48, p=1.20)),
     notes=(*_NOTES, "The data structure takes 2 bytes x number of inputs x MAX_COLUMNS."),
     step=shift_words_step,
 )

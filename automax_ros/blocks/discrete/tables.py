@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, Special, Time, Times
+from automax_ros.blocks.declare.declaration import Block, BlockTimes, Form, Input, Output, Special, Time
 from automax_ros.blocks.declare.rules import MostElements, Needs, NumberTrue, SameSize, TableOfPowers
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.types import DataType
@@ -66,7 +66,7 @@ FUNCTION = Block(
         Needs("SELECT", "TABLE2"),
         Needs("TABLE2", "SELECT", "AMX4094"),
     ),
-    times=Times(Time(23.56), Time(93.0), Time(20.30), Time(16.48)),
+    times=BlockTimes(Time(23.56), Time(93.0), Time(20.30), Time(16.48)),
     notes=(
         "LOCAL T%(16) has 17 elements, from T%(0) to T%(16): 2**4 + 1.",
         "A negative INPUT gives the negated result: the function is folded into the third quadrant.",
@@ -154,7 +154,7 @@ SEARCH = Block(
         Needs("TABLE2", "SELECT"),
     ),
     # Table 5 omits SEARCH: the UDC's time is ours, in the ratio of its other blocks to the 7010's (decision)
-    times=Times(Time(19.80, m=0.68), Time(74.0, m=3.0), Time(15.84, m=0.544), Time(13.88, m=0.48)),
+    times=BlockTimes(Time(19.80, m=0.68), Time(74.0, m=3.0), Time(15.84, m=0.544), Time(13.88, m=0.48)),
     notes=(
         "Two comparisons that are TRUE are joined by OR: greater than or equal to, for example.",
         "With COMPARE_GTR sort the table in descending order, with COMPARE_LES in ascending order.",

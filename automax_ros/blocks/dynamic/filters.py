@@ -19,6 +19,7 @@ from automax_ros.blocks.declare.coefficients import (
 )
 from automax_ros.blocks.declare.declaration import (
     Block,
+    BlockTimes,
     Coefficients,
     Form,
     Input,
@@ -27,7 +28,6 @@ from automax_ros.blocks.declare.declaration import (
     Relation,
     State,
     Time,
-    Times,
 )
 from automax_ros.blocks.declare.dynamics import Dynamics, Integrator, Transfer, corners_at, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
@@ -107,7 +107,7 @@ LAG = Block(
             integrator=Integrator("y1", _lag_rate, "WLG / C", what="OUTPUT"),
         )
     ),
-    times=Times(Time(26.52), Time(118.0), Time(41.0), Time(18.56)),
+    times=BlockTimes(Time(26.52), Time(118.0), Time(41.0), Time(18.56)),
     notes=(_RANGE_NOTE.format(what="OUTPUT"),),
     step=lag_step,
 )
@@ -162,7 +162,7 @@ DIFF_LAG = Block(
             integrator=Integrator("integrator", _lag_rate, "WLG / C", what=_IN_FEEDBACK, in_feedback=True),
         )
     ),
-    times=Times(Time(33.04), Time(154.0), Time(41.50), Time(23.12)),
+    times=BlockTimes(Time(33.04), Time(154.0), Time(41.50), Time(23.12)),
     notes=(
         _RANGE_NOTE.format(what=_IN_FEEDBACK),
         "An INPUT beyond that range leaves its excess in OUTPUT: 32767 settles at 32767 - 8191 = 24576.",
@@ -263,7 +263,7 @@ LEAD_LAG = Block(
             corners=corners_at("WLD", "WLG"),
         ),
     ),
-    times=Times(Time(68.60), Time(284.0), Time(39.70), Time(48.04)),
+    times=BlockTimes(Time(68.60), Time(284.0), Time(39.70), Time(48.04)),
     notes=(
         "WLD and WLG must be 2:1 to 20:1 apart, either way. Constants that are not are an error.",
         "Variables that are not are logged and the last good pair stays; a first pair moves to the nearest ratio.",

@@ -18,7 +18,7 @@ from automax_ros.blocks.declare.coefficients import (
     per_period,
     times_c,
 )
-from automax_ros.blocks.declare.declaration import Block, Coefficients, Input, Limit, Output, State, Time, Times
+from automax_ros.blocks.declare.declaration import Block, BlockTimes, Coefficients, Input, Limit, Output, State, Time
 from automax_ros.blocks.declare.dynamics import Dynamics, Integrator, Transfer, corners_at, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
@@ -111,7 +111,7 @@ INTEGRATE = Block(
             integrator=Integrator("y1", lambda values: values["KI"], "KI / C"),
         ),
     ),
-    times=Times(Time(39.14), Time(193.0), Time(58.60), Time(27.40)),
+    times=BlockTimes(Time(39.14), Time(193.0), Time(58.60), Time(27.40)),
     notes=(
         "With Kx = KI / C below 0.125 the integrator is limited to +-8191, below 0.25 to +-16383 (section 51).",
         "For y counts/s at a constant input of x, with WM not programmed: KI = 0.9918 y / x.",
@@ -223,7 +223,7 @@ PROP_INT = Block(
             integrator=Integrator("integrator", lambda values: values["KP"] * values["WLD"], "KP x WLD / C"),
         ),
     ),
-    times=Times(Time(40.32), Time(193.0), Time(70.85), Time(28.24)),
+    times=BlockTimes(Time(40.32), Time(193.0), Time(70.85), Time(28.24)),
     notes=(
         "With Kx = KP x WLD / C below 0.125 the integrator is limited to +-8191, below 0.25 to +-16383 (section 51).",
         "The holds act on the integrator alone: OUTPUT still follows KP times INPUT.",

@@ -19,6 +19,7 @@ from automax_ros.blocks.declare.declaration import (
     NOT_ON_UDC,
     UDC_ONLY,
     Block,
+    BlockTimes,
     Coefficients,
     Form,
     Input,
@@ -26,7 +27,6 @@ from automax_ros.blocks.declare.declaration import (
     Output,
     State,
     Time,
-    Times,
 )
 from automax_ros.blocks.declare.dynamics import Dynamics, Polynomial, Transfer, bilinear, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
@@ -129,7 +129,7 @@ NOTCH = Block(
             exact_at="WN",
         ),
     ),
-    times=Times(Time(85.16), Time(393.0), None, Time(59.60)),
+    times=BlockTimes(Time(85.16), Time(393.0), None, Time(59.60)),
     runs_on=NOT_ON_UDC,
     notes=("WN maps onto itself: C = WN / tan(WN T / 2).",),
     step=notch_step,
@@ -284,7 +284,7 @@ NOTCHN = Block(
             exact_at="WN",
         ),
     ),
-    times=Times(None, None, Time(64.25, o=20.0), None),
+    times=BlockTimes(None, None, Time(64.25, o=20.0), None),
     runs_on=UDC_ONLY,
     notes=("WN maps onto itself: C = WN / tan(WN T / 2).",),
     step=notchn_step,

@@ -16,6 +16,7 @@ from automax_ros.blocks.declare.coefficients import (
 from automax_ros.blocks.declare.declaration import (
     UDC_ONLY,
     Block,
+    BlockTimes,
     Coefficients,
     Form,
     Input,
@@ -23,7 +24,6 @@ from automax_ros.blocks.declare.declaration import (
     Output,
     State,
     Time,
-    Times,
 )
 from automax_ros.blocks.declare.dynamics import Dynamics, Transfer, corners_at, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
@@ -199,7 +199,7 @@ def _filter(
             compute=_coefficients(transfer, sign),
             dynamics=_dynamics(frequency, transfer, numerator),
         ),
-        times=Times(None, None, Time(39.25, o=4.0), None),
+        times=BlockTimes(None, None, Time(39.25, o=4.0), None),
         runs_on=UDC_ONLY,
         notes=(f"{frequency} maps onto itself: C = {frequency} / tan({frequency} T / 2).",),
         step=pass_filter_step,

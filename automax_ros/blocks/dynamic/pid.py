@@ -9,6 +9,7 @@ from automax_ros.blocks.declare.coefficients import SATURATED, constant
 from automax_ros.blocks.declare.declaration import (
     NOT_ON_UDC,
     Block,
+    BlockTimes,
     Coefficients,
     Form,
     Input,
@@ -16,7 +17,6 @@ from automax_ros.blocks.declare.declaration import (
     Output,
     State,
     Time,
-    Times,
 )
 from automax_ros.blocks.declare.dynamics import Dynamics, Integrator, Transfer
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, REAL_LIMIT
@@ -229,7 +229,7 @@ PID = Block(
         ),
         executed_every="LOOP_TIME",
     ),
-    times=Times(Time(124.0), Time(515.0), None, Time(86.80)),
+    times=BlockTimes(Time(124.0), Time(515.0), None, Time(86.80)),
     runs_on=NOT_ON_UDC,
     notes=(
         "LOOP_TIME is TICKS x tick rate where the block runs in every scan.",

@@ -10,6 +10,7 @@ from automax_ros.blocks.declare.coefficients import constant
 from automax_ros.blocks.declare.declaration import (
     UDC_ONLY,
     Block,
+    BlockTimes,
     Coefficients,
     Form,
     Input,
@@ -17,7 +18,6 @@ from automax_ros.blocks.declare.declaration import (
     Output,
     State,
     Time,
-    Times,
 )
 from automax_ros.blocks.declare.dynamics import Dynamics, Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX
@@ -86,7 +86,7 @@ TACHLOSS_OVERSPEED = Block(
             required=False,
         ),
     ),
-    times=Times(None, None, Time(22.00), None),
+    times=BlockTimes(None, None, Time(22.00), None),
     runs_on=UDC_ONLY,
     notes=("The voltage limits are in the units of the voltage feedback.",),
     step=tachloss_overspeed_step,
@@ -205,7 +205,7 @@ THERMAL_OVERLOAD = Block(
         ),
         limits_literals=True,
     ),
-    times=Times(None, None, Time(46.10), None),
+    times=BlockTimes(None, None, Time(46.10), None),
     runs_on=UDC_ONLY,
     notes=(
         "wlg = ln((LIM_BAR**2 - 100**2) / (LIM_BAR**2 - THRESHOLD**2)) / TRIP_TIME.",

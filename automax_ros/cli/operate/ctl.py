@@ -48,7 +48,7 @@ class _Refused(Exception):
     """The rack refused a request; the text says why."""
 
 
-class Session:
+class RackSession:
     """Operates one rack through a client; ``should_stop`` ends waits and repetitions."""
 
     def __init__(self, client: RackClient, should_stop: Callable[[], bool]) -> None:
@@ -119,7 +119,7 @@ class Session:
 
 
 @contextmanager
-def connected(arguments: argparse.Namespace, should_stop: Callable[[], bool]) -> Iterator[Session]:
+def connected(arguments: argparse.Namespace, should_stop: Callable[[], bool]) -> Iterator[RackSession]:
     """Join the graph, and yield a session with the rack while the block lasts.
 
     Raises:
@@ -131,7 +131,7 @@ def connected(arguments: argparse.Namespace, should_stop: Callable[[], bool]) ->
     ros = ros_arguments(arguments)
     try:
         with operating.RackClient(space_of(arguments.rack, ros), ros, should_stop) as client:
-            yield Session(client, should_stop)
+            yield RackSession(client, should_stop)
     except operating.NotOperable as fault:
         raise UsageError(f"{fault.message} (ROS domain {domain})", fault.hint) from fault
 

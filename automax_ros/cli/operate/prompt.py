@@ -8,8 +8,8 @@ import sys
 from collections.abc import Iterable
 
 from automax_ros.cli.operate.actions import ACTIONS, ServiceCall, add_actions
-from automax_ros.cli.operate.ctl import Session, connected
-from automax_ros.cli.shell.prompt import Interrupt, edit_lines, typed_lines
+from automax_ros.cli.operate.ctl import RackSession, connected
+from automax_ros.cli.shell.prompt import PromptInterrupt, edit_lines, typed_lines
 from automax_ros.core.user_error import UserError
 
 _QUIT = ("quit", "exit")
@@ -25,7 +25,7 @@ def run_shell(arguments: argparse.Namespace) -> int:
     Raises:
         UsageError: there is no such rack, several have the name, or it cannot be operated.
     """
-    interrupt = Interrupt()
+    interrupt = PromptInterrupt()
     with interrupt.watching(), connected(arguments, interrupt.taken) as session:
         shell = _Shell(session, arguments)
         session.call(_STATUS, arguments.timeout)
@@ -41,7 +41,7 @@ def run_shell(arguments: argparse.Namespace) -> int:
 class _Shell:
     """Carries out lines; errors are printed and do not end it."""
 
-    def __init__(self, session: Session, arguments: argparse.Namespace) -> None:
+    def __init__(self, session: RackSession, arguments: argparse.Namespace) -> None:
         self._session, self._given = session, arguments
         self._names: list[str] | None = None
         self._parser = argparse.ArgumentParser(prog="automax ctl", usage="ACTION ...", add_help=False)

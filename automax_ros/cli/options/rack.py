@@ -20,7 +20,7 @@ from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.loader import LoadResult, load
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.model.value_names import Tuning, setting, tuning
+from automax_ros.rackfile.model.value_names import TunableSetting, setting, tuning
 from automax_ros.rackfile.modules.registry import SUPPORTED
 
 DEFAULT_RACK_FILE = "rack.yaml"
@@ -176,7 +176,7 @@ def print_refused(command: str, error: RackError) -> int:
     return 1
 
 
-def split_settings(config: RackConfig, texts: list[str]) -> tuple[list[tuple[str, Value]], list[Tuning]]:
+def split_settings(config: RackConfig, texts: list[str]) -> tuple[list[tuple[str, Value]], list[TunableSetting]]:
     """Return the values that the texts of ``--set`` give to common variables, and those for tunables.
 
     Raises:
@@ -198,7 +198,7 @@ def split_settings(config: RackConfig, texts: list[str]) -> tuple[list[tuple[str
     return settings_of(config, others), tunings
 
 
-def begin_with(rack: Rack, tunings: Sequence[Tuning]) -> None:
+def begin_with(rack: Rack, tunings: Sequence[TunableSetting]) -> None:
     """Set tunables to the values of ``--set``, before the rack runs.
 
     They override the values kept from the last run, and ROS parameters (decision: who types it means

@@ -30,7 +30,7 @@ _MILLISECONDS = re.compile(r"[0-9]{1,6}(\.[0-9]{0,6})?|\.[0-9]{1,6}")
 
 
 @dataclass(frozen=True)
-class Target:
+class TaskTarget:
     """The target of a task given without a rack: the kind of Processor and its tick in ns."""
 
     processor: Platform
@@ -50,7 +50,7 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def target_of(arguments: argparse.Namespace) -> Target:
+def target_of(arguments: argparse.Namespace) -> TaskTarget:
     """Return the target that ``--target`` and ``--tick-ms`` give.
 
     Raises:
@@ -59,11 +59,11 @@ def target_of(arguments: argparse.Namespace) -> Target:
     processor = Platform(arguments.target)
     is_udc = processor is Platform.UDC
     if arguments.tick_ms is None:
-        return Target(processor, UDC_TICK_NS if is_udc else DEFAULT_TICK_NS)
+        return TaskTarget(processor, UDC_TICK_NS if is_udc else DEFAULT_TICK_NS)
     tick = tick_option(arguments.tick_ms)
     if is_udc and tick != UDC_TICK_NS:
         raise UsageError(f"--tick-ms {arguments.tick_ms}: the tick of a UDC is always 0.5 ms")
-    return Target(processor, tick)
+    return TaskTarget(processor, tick)
 
 
 def tick_option(text: str) -> int:
@@ -86,7 +86,7 @@ def is_rack_file(path: Path) -> bool:
     return suffix in _RACK_SUFFIXES or (not is_task_file(path) and path.is_dir())
 
 
-def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult]:
+def check_task_file(path: Path, target: TaskTarget) -> tuple[SourceText, CheckResult]:
     """Check a task without a rack: its COMMON statements serve as the definition of the rack's commons.
 
     Raises:
@@ -118,7 +118,7 @@ def require_clock(path: Path, program: Program) -> None:
         )
 
 
-def check_text(path: Path, text: str, target: Target) -> CheckResult:
+def check_text(path: Path, text: str, target: TaskTarget) -> CheckResult:
     """Check the text of a task without a rack, as that of a file of this name."""
     source = SourceText(str(path), text)
     return check(source, name=path.stem.upper(), catalogue=CATALOGUE, target=target.processor, tick_ns=target.tick_ns)

@@ -14,7 +14,7 @@ from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import printable
 from automax_ros.core.types import DataType
 from automax_ros.core.user_error import UsageError
-from automax_ros.recordings.tables.traces import ErrorMark, Line, Role, Traces, thinned
+from automax_ros.recordings.tables.traces import ErrorMark, Line, TraceRole, Traces, thinned
 
 DPI = 120
 _LINE_STYLES = ("-", "--", ":", "-.")
@@ -25,11 +25,11 @@ _HIGHEST_IN = 40.0
 _ROW_FILL = 0.7
 _THICKEST = 1.9
 """Each line is thinner than the one before, and later ones have gaps, so that a covered line remains visible."""
-_ROLES: dict[Role, dict[str, Any]] = {
-    Role.PLANT: {"color": "#b4bfc5", "linewidth": 4.0, "linestyle": "-", "zorder": 2.0},
-    Role.FEEDBACK: {"color": "#1565c0", "linewidth": 1.3, "linestyle": "-", "zorder": 2.1},
-    Role.LAGGED: {"color": "#ef6c00", "linewidth": 1.3, "linestyle": (0, (5, 4)), "zorder": 2.2},
-    Role.REFERENCE: {"color": "#000000", "linewidth": 1.3, "linestyle": (0, (1, 4)), "zorder": 2.3},
+_ROLES: dict[TraceRole, dict[str, Any]] = {
+    TraceRole.PLANT: {"color": "#b4bfc5", "linewidth": 4.0, "linestyle": "-", "zorder": 2.0},
+    TraceRole.FEEDBACK: {"color": "#1565c0", "linewidth": 1.3, "linestyle": "-", "zorder": 2.1},
+    TraceRole.LAGGED: {"color": "#ef6c00", "linewidth": 1.3, "linestyle": (0, (5, 4)), "zorder": 2.2},
+    TraceRole.REFERENCE: {"color": "#000000", "linewidth": 1.3, "linestyle": (0, (1, 4)), "zorder": 2.3},
 }
 """Styles of lines that show the same quantity and mostly agree: the plant's wide and pale underneath, the reference in
 thin dots on top, so that each is seen where all are equal (decision)."""
@@ -40,7 +40,7 @@ _LABEL_PX = 90
 
 
 @dataclass(frozen=True)
-class Layout:
+class FigureLayout:
     """The layout of a picture: title, size in pixels (height 0: as needed), whether each analog variable has a lane."""
 
     title: str
@@ -49,7 +49,7 @@ class Layout:
     separate: bool = False
 
 
-def figure_of(traces: Traces, layout: Layout) -> Any:
+def figure_of(traces: Traces, layout: FigureLayout) -> Any:
     """Return the matplotlib figure of the traces.
 
     Raises:

@@ -21,7 +21,7 @@ from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import printable
 from automax_ros.core.user_error import UsageError
 from automax_ros.drive.assess.assessment import assess
-from automax_ros.drive.assess.drive_case import DriveCase, DriveFindings, Finding, Verdict
+from automax_ros.drive.assess.drive_case import DriveCase, DriveFindings, Finding, Rating
 from automax_ros.language.program import Program
 from automax_ros.rackfile.checks.drives import drive_cases
 from automax_ros.rackfile.checks.tasks import check_tasks
@@ -122,7 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(records_of(found), indent=2))
     else:
         print("\n".join(lines_of(found)))
-    return 1 if wrong or any(item.verdict is Verdict.WRONG for drive in found for item in drive.findings) else 0
+    return 1 if wrong or any(item.verdict is Rating.WRONG for drive in found for item in drive.findings) else 0
 
 
 def _programs(config: RackConfig) -> tuple[list[Program], bool]:

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from automax_ros.cli.options.rack import add_outside_argument, add_set_argument, config_of, print_refused, settings_of
 from automax_ros.cli.options.stimuli import StimuliRefused, stimulation
-from automax_ros.cli.racks.step_session import Session, completions, execute, place_text
-from automax_ros.cli.shell.prompt import Interrupt, edit_lines, typed_lines
+from automax_ros.cli.racks.step_session import StepSession, completions, execute, place_text
+from automax_ros.cli.shell.prompt import PromptInterrupt, edit_lines, typed_lines
 from automax_ros.core.text import printable
 from automax_ros.core.user_error import UserError
 from automax_ros.rack.base.stop_cause import OperationRefused
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.ideal:
         config = replace(config, execution=Timing.IDEAL)
     settings = settings_of(config, arguments.settings)
-    interrupt = Interrupt()
+    interrupt = PromptInterrupt()
     try:
         stepper = Stepper(config, interrupted=interrupt.taken)
         happening = stimulation(stepper.rack, arguments.stimuli, allow_outside=arguments.allow_outside)
@@ -56,13 +56,13 @@ def run(arguments: argparse.Namespace) -> int:
     except StimuliRefused:
         return 1
     stepper.start(settings, happening.begin)
-    session = Session(stepper, _print_line)
+    session = StepSession(stepper, _print_line)
     with interrupt.watching():
         failed = _obey_all(session, interrupt)
     return 1 if failed or happening.refused else 0
 
 
-def _obey_all(session: Session, interrupt: Interrupt) -> bool:
+def _obey_all(session: StepSession, interrupt: PromptInterrupt) -> bool:
     """Carry out commands until their end; return whether one of a script failed."""
     interactive = sys.stdin.isatty()
     if interactive:
@@ -77,7 +77,7 @@ def _obey_all(session: Session, interrupt: Interrupt) -> bool:
     return failed and not interactive
 
 
-def _execute_line(session: Session, line: str) -> bool:
+def _execute_line(session: StepSession, line: str) -> bool:
     try:
         execute(session, line)
     except UserError as fault:

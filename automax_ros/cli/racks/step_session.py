@@ -15,7 +15,7 @@ from automax_ros.rack.operations.operations import Operations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.value_names import setting
 from automax_ros.scenario.report import STATUS_WORDS
-from automax_ros.scenario.stepper import Halt, Stepper, Variable, Why
+from automax_ros.scenario.stepper import Halt, SteppedVariable, Stepper, Why
 
 MOST_CHANGES = 20
 """How many changed variables are listed after a step (decision); ``watch`` chooses others."""
@@ -78,13 +78,13 @@ class CommandFault(UserError):
 
 
 @dataclass
-class Session:
+class StepSession:
     """The session with one stepped rack; ``print_line`` prints a text as a line. ``over`` is TRUE after ``quit``."""
 
     stepper: Stepper
     print_line: Callable[[str], None]
     over: bool = False
-    _watched: dict[str, Variable] = field(default_factory=dict)
+    _watched: dict[str, SteppedVariable] = field(default_factory=dict)
 
     def step(self, words: list[str], one: Callable[[str], Halt]) -> None:
         """Repeat a step of a task the given number of times, or until something else halts the rack."""
@@ -145,7 +145,7 @@ class Session:
     def show(self, words: list[str]) -> None:
         """Print the values of variables, or of all simple variables of a task."""
         tasks = {task.name for task in self.stepper.rack.tasks}
-        found: list[Variable] = []
+        found: list[SteppedVariable] = []
         for word in words:
             is_task = word.upper() in tasks
             found += self.stepper.variables.of_task(word.upper()) if is_task else [self.stepper.variables.find(word)]
@@ -249,7 +249,7 @@ class Session:
         """End the session."""
         self.over = True
 
-    def _simple_variables(self) -> Iterator[Variable]:
+    def _simple_variables(self) -> Iterator[SteppedVariable]:
         """Yield the simple commons, and the locals of the held task, or of all tasks if none is held."""
         rack, (task, _) = self.stepper.rack, self.stepper.place
         for variable in rack.config.declared:
@@ -280,17 +280,17 @@ class Session:
 
 
 @dataclass(frozen=True)
-class Command:
+class StepCommand:
     """A command: its usage, its description, its function, and the least and the most words that it takes."""
 
     usage: str
     text: str
-    act: Callable[[Session, list[str]], None]
+    act: Callable[[StepSession, list[str]], None]
     least: int = 0
     most: int = 2
 
 
-def execute(session: Session, line: str) -> None:
+def execute(session: StepSession, line: str) -> None:
     """Carry out a line: a command and its words; an empty line, or one that begins with #, does nothing.
 
     Raises:
@@ -308,7 +308,7 @@ def execute(session: Session, line: str) -> None:
     command.act(session, words)
 
 
-def completions(session: Session, text: str) -> list[str]:
+def completions(session: StepSession, text: str) -> list[str]:
     """Return the words that begin with a text: commands, tasks, names of variables."""
     rack = session.stepper.rack
     names = [variable.name for variable in rack.config.declared]
@@ -317,71 +317,73 @@ def completions(session: Session, text: str) -> list[str]:
     return [word for word in known if word.lower().startswith(text.lower())]
 
 
-def _help(session: Session, words: list[str]) -> None:
+def _help(session: StepSession, words: list[str]) -> None:
     names = [word.lower() for word in words if word.lower() in COMMANDS] or list(COMMANDS)
     for line in table([[f"  {COMMANDS[name].usage}", COMMANDS[name].text] for name in names]):
         session.print_line(line)
 
 
-def _operations(session: Session) -> Operations:
+def _operations(session: StepSession) -> Operations:
     return session.stepper.rack.operations
 
 
-COMMANDS: dict[str, Command] = {
-    "line": Command(
+COMMANDS: dict[str, StepCommand] = {
+    "line": StepCommand(
         "line [TASK] [N]",
         "one BASIC line of the scan that is held, or of the next scan",
         lambda s, w: s.step(w, s.stepper.line),
     ),
-    "scan": Command(
+    "scan": StepCommand(
         "scan [TASK] [N]", "to the end of the next scan, of a task or of any", lambda s, w: s.step(w, s.stepper.scan)
     ),
-    "tick": Command(
+    "tick": StepCommand(
         "tick [N]",
         "one tick of the first Processor",
-        Session.ticks,
+        StepSession.ticks,
         most=1,
     ),
-    "go": Command("go [S]", "on to a breakpoint or a fault, S seconds at most", Session.go, most=1),
-    "until": Command("until S", "on to rack time S, in seconds, at most", Session.until, 1, 1),
-    "break": Command(
-        "break [TASK:LINE | NAME]", "halt before a line, or when a variable has changed", Session.add_break, most=1
+    "go": StepCommand("go [S]", "on to a breakpoint or a fault, S seconds at most", StepSession.go, most=1),
+    "until": StepCommand("until S", "on to rack time S, in seconds, at most", StepSession.until, 1, 1),
+    "break": StepCommand(
+        "break [TASK:LINE | NAME]", "halt before a line, or when a variable has changed", StepSession.add_break, most=1
     ),
-    "clear": Command(
+    "clear": StepCommand(
         "clear TASK:LINE | NAME | all", "take a breakpoint away", lambda s, w: s.stepper.clear(w[0]), 1, 1
     ),
-    "watch": Command("watch [NAME ...]", "show these variables after each step", Session.watch, most=99),
-    "unwatch": Command("unwatch [NAME ...]", "show them no longer", Session.unwatch, most=99),
-    "show": Command("show NAME ... | TASK", "the values of variables, or of all of a task", Session.show, 1, 99),
-    "set": Command("set NAME=VALUE", "write a common", lambda s, w: s.assign(w, s.stepper.rack.adjust.set), 1, 99),
-    "force": Command(
+    "watch": StepCommand("watch [NAME ...]", "show these variables after each step", StepSession.watch, most=99),
+    "unwatch": StepCommand("unwatch [NAME ...]", "show them no longer", StepSession.unwatch, most=99),
+    "show": StepCommand(
+        "show NAME ... | TASK", "the values of variables, or of all of a task", StepSession.show, 1, 99
+    ),
+    "set": StepCommand("set NAME=VALUE", "write a common", lambda s, w: s.assign(w, s.stepper.rack.adjust.set), 1, 99),
+    "force": StepCommand(
         "force NAME=VALUE",
         "hold a common or TASK.NAME at a value",
         lambda s, w: s.assign(w, s.stepper.rack.adjust.force),
         1,
         99,
     ),
-    "unforce": Command("unforce [NAME ... | all]", "end forces", Session.unforce, most=99),
-    "tune": Command("tune TASK.NAME=VALUE", "set a tunable", Session.tune, 1, 99),
-    "run": Command("run TASK", "put a task into RUN", lambda s, w: _operations(s).run(w[0].upper()), 1, 1),
-    "stop": Command("stop TASK", "stop a task", lambda s, w: _operations(s).stop(w[0].upper()), 1, 1),
-    "run-all": Command("run-all", "put all tasks into RUN", lambda s, _: _operations(s).run_all(), most=0),
-    "stop-all": Command(
+    "unforce": StepCommand("unforce [NAME ... | all]", "end forces", StepSession.unforce, most=99),
+    "tune": StepCommand("tune TASK.NAME=VALUE", "set a tunable", StepSession.tune, 1, 99),
+    "run": StepCommand("run TASK", "put a task into RUN", lambda s, w: _operations(s).run(w[0].upper()), 1, 1),
+    "stop": StepCommand("stop TASK", "stop a task", lambda s, w: _operations(s).stop(w[0].upper()), 1, 1),
+    "run-all": StepCommand("run-all", "put all tasks into RUN", lambda s, _: _operations(s).run_all(), most=0),
+    "stop-all": StepCommand(
         "stop-all",
         "stop all tasks and clear volatile memory",
         lambda s, _: _operations(s).stop_all("STOP ALL by command"),
         most=0,
     ),
-    "clear-errors": Command(
+    "clear-errors": StepCommand(
         "clear-errors [TASK]",
         "clear error logs",
         lambda s, w: _operations(s).clear_errors(w[0].upper() if w else None),
         most=1,
     ),
-    "list": Command("list [TASK] [LINE]", "the source of a task", Session.source),
-    "tasks": Command("tasks", "the tasks and what they do", lambda s, _: s.tasks(), most=0),
-    "errors": Command("errors", "the error logs", lambda s, _: s.errors(), most=0),
-    "help": Command("help [COMMAND]", "this list", _help, most=1),
-    "quit": Command("quit", "leave", lambda s, _: s.end(), most=0),
+    "list": StepCommand("list [TASK] [LINE]", "the source of a task", StepSession.source),
+    "tasks": StepCommand("tasks", "the tasks and what they do", lambda s, _: s.tasks(), most=0),
+    "errors": StepCommand("errors", "the error logs", lambda s, _: s.errors(), most=0),
+    "help": StepCommand("help [COMMAND]", "this list", _help, most=1),
+    "quit": StepCommand("quit", "leave", lambda s, _: s.end(), most=0),
 }
 """The commands by name."""

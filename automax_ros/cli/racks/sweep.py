@@ -22,7 +22,7 @@ from automax_ros.cli.options.values import seconds_above_0, whole_number
 from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, print_native, where_of
 from automax_ros.cli.output.screen import ProgressBar
 from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
-from automax_ros.cli.racks.sweep_output import Output, Wanted, best_of, prepared, print_best
+from automax_ros.cli.racks.sweep_output import SweepOutput, Wanted, best_of, prepared, print_best
 from automax_ros.cli.run.plan import warn
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S
@@ -180,7 +180,7 @@ def _carry_out(sweep: _Sweep, arguments: argparse.Namespace, stop: StopRequest) 
             rows = _rows(sweep, stop)
         else:
             rows = record_run(plan, points[0], arguments.record, lambda: stop.requested)
-        output = Output(plan, wanted, rows, len(points))
+        output = SweepOutput(plan, wanted, rows, len(points))
         if arguments.output is not None:
             output.write(arguments.output)
     if arguments.json:

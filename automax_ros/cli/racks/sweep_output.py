@@ -207,7 +207,7 @@ def prepared(folder: Path | None) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Output:
+class SweepOutput:
     """The rows of a sweep of ``count`` runs, and their output."""
 
     plan: Plan
@@ -270,7 +270,7 @@ class Output:
         }
 
 
-def print_best(output: Output) -> None:
+def print_best(output: SweepOutput) -> None:
     """Print the best runs, the command that repeats the best, and the faults."""
     best, plan, wanted = output.best, output.plan, output.wanted
     if best:
@@ -290,7 +290,7 @@ def _cells(plan: Plan, row: Row) -> list[str]:
     return [str(row.number), *values, *("-" if item is None else f"{item:.6g}" for item in row.outcome.measures)]
 
 
-def _print_faults(output: Output) -> None:
+def _print_faults(output: SweepOutput) -> None:
     faults = Counter(row.outcome.fault for row in output.rows if row.outcome.fault)
     for text, number in faults.most_common(_MOST_FAULTS):
         first = next(row.number for row in output.rows if row.outcome.fault == text)

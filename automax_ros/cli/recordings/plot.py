@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from automax_ros.cli.options.values import add_window_arguments, watch_list, window_of
-from automax_ros.cli.output.figure import Layout, figure_of, save
+from automax_ros.cli.output.figure import FigureLayout, figure_of, save
 from automax_ros.cli.output.files import require_picture_file
 from automax_ros.cli.output.screen import share_shown
 from automax_ros.cli.output.signals import ended_by_signals
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         if window.start_ns or window.end_ns is not None:
             end = seconds_text(round(shown.end_s * 10**9))
             title += f", {seconds_text(window.start_ns)} to {end} s"
-        save(figure_of(shown, Layout(title, width, height, arguments.separate)), output)
+        save(figure_of(shown, FigureLayout(title, width, height, arguments.separate)), output)
     return 0
 
 

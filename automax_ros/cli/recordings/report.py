@@ -17,7 +17,7 @@ from html import escape
 from pathlib import Path
 
 from automax_ros.cli.options.values import add_window_arguments, window_of
-from automax_ros.cli.output.figure import Layout, figure_of, image_of, save_picture
+from automax_ros.cli.output.figure import FigureLayout, figure_of, image_of, save_picture
 from automax_ros.cli.output.files import require_different_files, require_writable, write_text
 from automax_ros.cli.output.screen import print_diagnostics, share_shown
 from automax_ros.cli.output.signals import ended_by_signals
@@ -29,7 +29,7 @@ from automax_ros.recordings.tables.traces import MAX_LINES, Traces
 from automax_ros.replay.drive_report.drive_report import DriveReport, drive_report
 from automax_ros.replay.drive_report.drive_run import DriveRun
 from automax_ros.replay.drive_report.drive_totals import J_PER_KWH, CountTotals, PlantTotals, rpm_of
-from automax_ros.replay.drive_report.happenings import Event
+from automax_ros.replay.drive_report.happenings import DriveEvent
 from automax_ros.replay.drive_report.rack_report import RackReport, rack_report
 from automax_ros.replay.scans.stored_rack import SourceRefused
 
@@ -77,7 +77,7 @@ def image(name: str, picture: bytes) -> str:
     return f'<img alt="{plain(name)} over time" src="data:image/png;base64,{encoded}">'
 
 
-def sequence(events: Sequence[Event], omitted: int) -> list[str]:
+def sequence(events: Sequence[DriveEvent], omitted: int) -> list[str]:
     """Return the events as a table, empty without events; ``omitted`` is the number of events not listed."""
     if not events:
         return []
@@ -291,7 +291,7 @@ def run(arguments: argparse.Namespace) -> int:
     shown = _together(report) if whole is None else whole.traces
     picture = None
     if shown.lines and (png is not None or len(report.drives) < 2):
-        picture = image_of(figure_of(shown, Layout(f"{report.rack[:80]}: {name[:80]}", _WIDTH_PX)))
+        picture = image_of(figure_of(shown, FigureLayout(f"{report.rack[:80]}: {name[:80]}", _WIDTH_PX)))
     if output is not None:
         text = page(report, name, _pictures(report, picture)) if whole is None else rack_page(whole, name, picture)
         write_text(output, text)
@@ -336,7 +336,7 @@ def _pictures(report: DriveReport, together: bytes | None) -> dict[str, bytes]:
     for run, marks in report.drives:
         traces = report.traces(run, marks)
         if traces.lines:
-            found[run.drive.name] = image_of(figure_of(traces, Layout(run.drive.name, _WIDTH_PX)))
+            found[run.drive.name] = image_of(figure_of(traces, FigureLayout(run.drive.name, _WIDTH_PX)))
     return found
 
 

@@ -19,7 +19,7 @@ from automax_ros.rack.operator.retention import default_folder
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.model.config import CommonElement, RackConfig
-from automax_ros.rackfile.model.value_names import Tuning, watched
+from automax_ros.rackfile.model.value_names import TunableSetting, watched
 from automax_ros.rackfile.processes import RackProcess
 from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
@@ -72,7 +72,7 @@ class RunPlan:
     ros: RosArguments = NO_ARGUMENTS
     process_plan: ProcessPlan | None = None
     simulated: SimulatedTime | None = None
-    tunings: tuple[Tuning, ...] = ()
+    tunings: tuple[TunableSetting, ...] = ()
     native: NativeForms = IN_PYTHON
     verbose: bool = False
 

@@ -21,7 +21,7 @@ class Option:
 
 
 @dataclass(frozen=True)
-class Command:
+class Subcommand:
     """A subcommand: its words after ``automax``, its purpose, its arguments; ``inner`` are its own subcommands."""
 
     words: tuple[str, ...]
@@ -30,23 +30,23 @@ class Command:
     usage: str
     positionals: tuple[Option, ...]
     options: tuple[Option, ...]
-    inner: tuple[Command, ...]
+    inner: tuple[Subcommand, ...]
 
-    def all(self) -> Iterator[Command]:
+    def all(self) -> Iterator[Subcommand]:
         """Yield the command and the subcommands in it."""
         yield self
         for command in self.inner:
             yield from command.all()
 
 
-def commands() -> tuple[Command, ...]:
+def commands() -> tuple[Subcommand, ...]:
     """Return every subcommand, in the order of the help."""
     found = parsers({name: module_of(name) for name in SUBCOMMANDS})[1]
     return tuple(_command(found[name], (name,), title) for name, title in SUBCOMMANDS.items())
 
 
-def _command(parser: argparse.ArgumentParser, words: tuple[str, ...], title: str) -> Command:
-    inner: list[Command] = []
+def _command(parser: argparse.ArgumentParser, words: tuple[str, ...], title: str) -> Subcommand:
+    inner: list[Subcommand] = []
     options: list[Option] = []
     positionals: list[Option] = []
     for action in parser._actions:
@@ -60,10 +60,10 @@ def _command(parser: argparse.ArgumentParser, words: tuple[str, ...], title: str
             positionals.append(_option(action))
     text = parser.description or ""
     usage = " ".join(parser.format_usage().removeprefix("usage:").split())
-    return Command(words, title, text, usage, tuple(positionals), tuple(options), tuple(inner))
+    return Subcommand(words, title, text, usage, tuple(positionals), tuple(options), tuple(inner))
 
 
-def _inner(action: argparse._SubParsersAction[argparse.ArgumentParser], words: Sequence[str]) -> Iterator[Command]:
+def _inner(action: argparse._SubParsersAction[argparse.ArgumentParser], words: Sequence[str]) -> Iterator[Subcommand]:
     titles = {choice.dest: choice.help or "" for choice in action._choices_actions}
     for name, parser in action.choices.items():
         yield _command(parser, (*words, name), titles.get(name, ""))

@@ -11,7 +11,7 @@ import argparse
 import shlex
 from collections.abc import Callable, Sequence
 
-from automax_ros.cli.shell.arguments import Command, Option, commands
+from automax_ros.cli.shell.arguments import Option, Subcommand, commands
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def bash(found: Sequence[Command]) -> str:
+def bash(found: Sequence[Subcommand]) -> str:
     """Return the script for bash 4 or later; readline shows words without descriptions."""
     every = [inner for command in found for inner in command.all()]
     choices = [
@@ -59,7 +59,7 @@ complete -o default -F _automax automax
 """
 
 
-def zsh(found: Sequence[Command]) -> str:
+def zsh(found: Sequence[Subcommand]) -> str:
     """Return the script for zsh."""
     every = [inner for command in found for inner in command.all()]
     cases = [f'        ("{_path(command)}") found=({_described(command)}) ;;' for command in every]
@@ -84,7 +84,7 @@ compdef _automax automax
 """
 
 
-def fish(found: Sequence[Command]) -> str:
+def fish(found: Sequence[Subcommand]) -> str:
     """Return the script for fish."""
     lines = [f"complete -c automax -f -n '__automax_at \"\"' {_fish_word(item)}" for item in found]
     for command in (inner for item in found for inner in item.all()):
@@ -107,26 +107,26 @@ end
 """
 
 
-SHELLS: dict[str, Callable[[Sequence[Command]], str]] = {"bash": bash, "zsh": zsh, "fish": fish}
+SHELLS: dict[str, Callable[[Sequence[Subcommand]], str]] = {"bash": bash, "zsh": zsh, "fish": fish}
 """The function that returns the script for each shell."""
 
 
-def _path(command: Command) -> str:
+def _path(command: Subcommand) -> str:
     return "".join(f" {word}" for word in command.words)
 
 
-def _paths(every: Sequence[Command]) -> str:
+def _paths(every: Sequence[Subcommand]) -> str:
     return " | ".join(f'"{_path(command)}"' for command in every)
 
 
-def _words(command: Command) -> list[str]:
+def _words(command: Subcommand) -> list[str]:
     """Return the words that may follow a subcommand: its own subcommands, the words of its arguments, its options."""
     inner = [item.words[-1] for item in command.inner]
     values = [value for item in command.positionals for value in item.values]
     return inner + values + [name for option in command.options for name in option.names]
 
 
-def _described(command: Command) -> str:
+def _described(command: Subcommand) -> str:
     inner = [_pair(item.words[-1], item.title) for item in command.inner]
     values = [_pair(value, item.text) for item in command.positionals for value in item.values]
     return " ".join(inner + values + [_pair(name, option.text) for option in command.options for name in option.names])
@@ -137,7 +137,7 @@ def _pair(word: str, text: str) -> str:
     return shlex.quote(f"{escaped}:{' '.join(text.split())}")
 
 
-def _fish_word(command: Command) -> str:
+def _fish_word(command: Subcommand) -> str:
     return f"-a {command.words[-1]} -d {_fish_text(command.title)}"
 
 

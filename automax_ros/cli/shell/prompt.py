@@ -13,7 +13,7 @@ _DELIMITERS = " \t\n=:"
 
 
 @dataclass
-class Interrupt:
+class PromptInterrupt:
     """Ctrl-C: at the prompt it discards the line, during an operation it is recorded."""
 
     pending: bool = False
@@ -49,7 +49,7 @@ class Interrupt:
             self._prompting = False
 
 
-def typed_lines(prompt: str, interrupt: Interrupt) -> Iterator[str]:
+def typed_lines(prompt: str, interrupt: PromptInterrupt) -> Iterator[str]:
     """Yield the typed lines until Ctrl-D; Ctrl-C discards the present one."""
     while True:
         try:

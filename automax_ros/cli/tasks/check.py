@@ -16,7 +16,7 @@ from pathlib import Path
 
 from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.cli.options.task import (
-    Target,
+    TaskTarget,
     add_target_arguments,
     check_task_file,
     is_rack_file,
@@ -94,7 +94,7 @@ def _refuse_idle_options(arguments: argparse.Namespace) -> None:
         raise UsageError("--target and --tick-ms are for tasks given by themselves", "a rack file has `tick_ms:`")
 
 
-def _task_file(path: Path, target: Target) -> list[_Findings]:
+def _task_file(path: Path, target: TaskTarget) -> list[_Findings]:
     source, result = check_task_file(path, target)
     warning = name_warning(path)
     found = _naming_convert(source, result.diagnostics)

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from automax_ros.cli.options.task import Target, add_target_arguments, check_text, require_task, target_of
+from automax_ros.cli.options.task import TaskTarget, add_target_arguments, check_text, require_task, target_of
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import count_of, printable
@@ -81,7 +81,7 @@ def _places(files: list[Path], folder: Path | None) -> dict[Path, Path]:
     return places
 
 
-def _convert(path: Path, target: Target) -> Converted:
+def _convert(path: Path, target: TaskTarget) -> Converted:
     require_task(path)
     try:
         data = read_bytes(path)

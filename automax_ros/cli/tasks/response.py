@@ -27,8 +27,8 @@ from automax_ros.core.user_error import UsageError
 from automax_ros.language.program import Program
 from automax_ros.tuning.driven import STANDING
 from automax_ros.tuning.dynamic_calls import DynamicCall, require_running, tuning_of
-from automax_ros.tuning.frequency import Measured, decibels
-from automax_ros.tuning.response import BlockResponse, Point, Range, measured_response
+from automax_ros.tuning.frequency import MeasuredResponse, decibels
+from automax_ros.tuning.response import BlockResponse, FrequencyPoint, FrequencyRange, measured_response
 from automax_ros.tuning.step_response import MOST_SCANS, SETTLED, default_scans
 from automax_ros.tuning.transfer_text import fixed, number_text
 from automax_ros.tuning.tuning import Tuning
@@ -145,7 +145,7 @@ def _check(arguments: argparse.Namespace) -> None:
         raise UsageError(f"--output {arguments.output}: a picture ends in {', '.join(_PICTURES)}")
 
 
-def _range(arguments: argparse.Namespace, tuning: Tuning) -> Range:
+def _range(arguments: argparse.Namespace, tuning: Tuning) -> FrequencyRange:
     """Return the range of frequencies to measure at."""
     nyquist = tuning.nyquist_rad_s
     for name, value in (("--from", arguments.low), ("--to", arguments.high)):
@@ -157,7 +157,7 @@ def _range(arguments: argparse.Namespace, tuning: Tuning) -> Range:
     if low >= high:
         raise UsageError(f"--from {low:g}: without --to the highest frequency is {high:.6g} rad/s")
     points = arguments.points or (_POINTS if arguments.output is None else _POINTS_DRAWN)
-    return Range(low, high, points)
+    return FrequencyRange(low, high, points)
 
 
 def _scans(arguments: argparse.Namespace, tuning: Tuning) -> int:
@@ -262,7 +262,7 @@ def _bode(response: BlockResponse) -> str:
     return f"Bode diagram; counts: the amplitude of the sine\n{above}\n{head}\n{body}{_legend(response)}"
 
 
-def _doubt(point: Point) -> str:
+def _doubt(point: FrequencyPoint) -> str:
     found = point.measured
     if found is None or found.reliable:
         return ""
@@ -286,7 +286,7 @@ def _legend(response: BlockResponse) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def _may_be_smaller(found: Sequence[Measured]) -> bool:
+def _may_be_smaller(found: Sequence[MeasuredResponse]) -> bool:
     """Return whether a smaller sine could avoid the limits that were reached; it cannot avoid a MAX_CHANGE of 0."""
     return any(item.amplitude > 1 and item.touched and STANDING not in item.touched for item in found)
 
@@ -367,7 +367,7 @@ def _bode_records(response: BlockResponse) -> list[dict[str, object]]:
     return [_bode_record(point) for point in response.points]
 
 
-def _bode_record(point: Point) -> dict[str, object]:
+def _bode_record(point: FrequencyPoint) -> dict[str, object]:
     found = point.measured
     doubt = None if found is None or not math.isfinite(found.uncertainty_db) else found.uncertainty_db
     return {

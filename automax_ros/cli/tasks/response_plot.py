@@ -9,7 +9,7 @@ from typing import Any
 
 from automax_ros.cli.output.figure import new_figure, save
 from automax_ros.tuning.frequency import decibels, logarithmic
-from automax_ros.tuning.response import BlockResponse, Point, followed
+from automax_ros.tuning.response import BlockResponse, FrequencyPoint, followed
 
 _LAPLACE, _DESIGN, _MEASURED, _MARK = "#d1892f", "#1f4e9c", "black", "#7a7a7a"
 _CURVE, _STEPS, _TIMES = 300, 2000, 400
@@ -104,11 +104,11 @@ def _draw_bode(gain: Any, phase: Any, response: BlockResponse) -> None:
     gain.legend(fontsize=8, frameon=False)
 
 
-def _is(point: Point, reliable: bool) -> bool:
+def _is(point: FrequencyPoint, reliable: bool) -> bool:
     return point.measured is not None and point.measured.reliable is reliable
 
 
-def _draw_points(gain: Any, phase: Any, points: list[Point], label: str, *, reliable: bool) -> None:
+def _draw_points(gain: Any, phase: Any, points: list[FrequencyPoint], label: str, *, reliable: bool) -> None:
     """Draw measured points; uncertain ones are hollow and have error bars."""
     if not points:
         return
@@ -134,7 +134,7 @@ def _draw_points(gain: Any, phase: Any, points: list[Point], label: str, *, reli
     )  # fmt: skip
 
 
-def _bar(point: Point) -> tuple[float, float]:
+def _bar(point: FrequencyPoint) -> tuple[float, float]:
     assert point.measured is not None
     size, doubt = abs(point.measured.gain), point.measured.uncertainty
     level = _level(point.measured.gain)

@@ -39,7 +39,7 @@ from automax_ros.language.program import Program
 from automax_ros.tuning.dynamic_calls import DynamicCall, Parameter, Source, tuning_of
 from automax_ros.tuning.frequency import decibels
 from automax_ros.tuning.transfer_text import digits_for, discrete_text, gain_text, number_text
-from automax_ros.tuning.tuning import Corner, LimitNow, Tuning, Verdict
+from automax_ros.tuning.tuning import Corner, LimitNow, LimitVerdict, Tuning
 
 Found = Sequence[tuple[DynamicCall, Tuning]]
 
@@ -232,10 +232,10 @@ _WIDTH = 106
 _JOINED = "\u00a0"
 """A blank at which lines are not wrapped."""
 _HINTS = {
-    Verdict.NEAR_LOW: "! within 10 % of the low limit",
-    Verdict.NEAR_HIGH: "! within 10 % of the high limit",
-    Verdict.BELOW: "! too low: the limit is in force and AMX7004 is logged",
-    Verdict.ABOVE: "! too high: the limit is in force and AMX7004 is logged",
+    LimitVerdict.NEAR_LOW: "! within 10 % of the low limit",
+    LimitVerdict.NEAR_HIGH: "! within 10 % of the high limit",
+    LimitVerdict.BELOW: "! too low: the limit is in force and AMX7004 is logged",
+    LimitVerdict.ABOVE: "! too high: the limit is in force and AMX7004 is logged",
 }
 
 
@@ -435,10 +435,10 @@ def _ratio(tuning: Tuning) -> Rows:
     if found is None:
         return
     hints = {
-        Verdict.NEAR_LOW: f"  ! within 10 % of {found.low:g}:1",
-        Verdict.NEAR_HIGH: f"  ! within 10 % of {found.high:g}:1",
-        Verdict.BELOW: f"  ! beyond: {found.parameters[0]} is moved at first, and AMX7004 is logged",
-        Verdict.ABOVE: f"  ! beyond: {found.parameters[0]} is moved at first, and AMX7004 is logged",
+        LimitVerdict.NEAR_LOW: f"  ! within 10 % of {found.low:g}:1",
+        LimitVerdict.NEAR_HIGH: f"  ! within 10 % of {found.high:g}:1",
+        LimitVerdict.BELOW: f"  ! beyond: {found.parameters[0]} is moved at first, and AMX7004 is logged",
+        LimitVerdict.ABOVE: f"  ! beyond: {found.parameters[0]} is moved at first, and AMX7004 is logged",
     }
     names = " and ".join(found.parameters)
     hint = hints.get(found.verdict, "")

@@ -10,7 +10,7 @@ import enum
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from automax_ros.blocks.declare.declaration import Platform, Time, Times
+from automax_ros.blocks.declare.declaration import BlockTimes, Platform, Time
 from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES, SCAN_LOOP
 from automax_ros.core.ticks import NS_PER_US, UDC_MAX_TICKS
 from automax_ros.core.types import DataType
@@ -91,13 +91,13 @@ class CostModel:
         """Return the time of what takes so long on a 7010, by estimate."""
         return 0 if self.model is Model.NONE else _to_ns(microseconds * SLOWER_THAN_7010.get(self.model, 1.0))
 
-    def _scan_part(self, times: Times, program: Program) -> int:
+    def _scan_part(self, times: BlockTimes, program: Program) -> int:
         time = self._time(times)
         if time is None:
             return 0
         return _to_ns(_sum(time, _commons(program.symbols.values())) + (time.alone if self.alone else 0.0))
 
-    def _time(self, times: Times) -> Time | None:
+    def _time(self, times: BlockTimes) -> Time | None:
         if self.model is Model.MODEL_7010:
             return times.model_7010
         if self.model in (Model.MODEL_6010, Model.MODEL_6011):

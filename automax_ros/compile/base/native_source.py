@@ -39,7 +39,7 @@ class NativeSource:
 
 
 @dataclass(frozen=True)
-class Form:
+class TaskFunction:
     """One of a task's functions as a tree, its statements with their BASIC lines; its callees, and its commons."""
 
     function: ast.FunctionDef

@@ -42,7 +42,7 @@ def _comparison(operator: type[ast.cmpop]) -> Callable[[Traced, object], Truth]:
 class Traced:
     """A REAL of which only the name is known."""
 
-    def __init__(self, recorder: Recorder, node: ast.expr) -> None:
+    def __init__(self, recorder: OperationTracer, node: ast.expr) -> None:
         self.recorder, self.node = recorder, node
 
     __add__, __radd__ = _operations(ast.Add)
@@ -76,7 +76,7 @@ class Traced:
 class Truth:
     """The comparison of two numbers; each evaluation follows one branch, a later run follows the other."""
 
-    def __init__(self, recorder: Recorder, test: ast.expr) -> None:
+    def __init__(self, recorder: OperationTracer, test: ast.expr) -> None:
         self.recorder, self.test = recorder, test
 
     def __bool__(self) -> bool:
@@ -89,7 +89,7 @@ class _Fork(Exception):
         self.test = test
 
 
-class Recorder:
+class OperationTracer:
     """Records the operations of one run of a function after its last given answer."""
 
     def __init__(self, prefix: str, answers: Sequence[bool] = ()) -> None:
@@ -148,7 +148,7 @@ def traced(
         paths += 1
         if paths > MOST_PATHS:
             raise NotNative("coefficients that depend on too many tests")
-        recorder = Recorder(prefix, answers)
+        recorder = OperationTracer(prefix, answers)
         given = {key: Traced(recorder, item) if isinstance(item, ast.expr) else item for key, item in numbers.items()}
         try:
             found = carried_out(*before, given)

@@ -17,7 +17,7 @@ from automax_ros.compile.base.layout import Role, StateField
 from automax_ros.compile.base.scan_io import MUST_WAIT, Suspension
 from automax_ros.compile.lowering.expressions import lower, of_type
 from automax_ros.compile.lowering.flow import Flow, is_jumping
-from automax_ros.compile.lowering.statements import GOSUB_DEPTH, Row, StatementLowering
+from automax_ros.compile.lowering.statements import GOSUB_DEPTH, StatementLowering, StatementRow
 from automax_ros.compile.lowering.stores import converted_to, printable, store
 from automax_ros.core.types import DataType
 from automax_ros.language.program import OpenedFile
@@ -284,19 +284,19 @@ class WaitingLowering(StatementLowering):
         waits = [flow.to_next(), _return(Suspension.PORT, build.constant(statement.file))]
         self._next_block(flow, build.when(is_open, waits, [flow.to_next()]))
 
-    _waiting: ClassVar[dict[type, Row]] = {
-        WaitOn: Row(_wait_on, 20.0),
-        Delay: Row(_delay, 20.0),
-        StartEvery: Row(_start_every, 20.0),
-        OpenChannel: Row(_open_channel, 60.0),
-        OpenPort: Row(_open_port, 60.0),
-        Close: Row(_close, 30.0),
-        InputFile: Row(_input, 40.0),
-        PrintFile: Row(_print_file, 60.0),
-        Get: Row(_wait_for_port, 30.0),
-        Put: Row(_put, 40.0),
+    _waiting: ClassVar[dict[type, StatementRow]] = {
+        WaitOn: StatementRow(_wait_on, 20.0),
+        Delay: StatementRow(_delay, 20.0),
+        StartEvery: StatementRow(_start_every, 20.0),
+        OpenChannel: StatementRow(_open_channel, 60.0),
+        OpenPort: StatementRow(_open_port, 60.0),
+        Close: StatementRow(_close, 30.0),
+        InputFile: StatementRow(_input, 40.0),
+        PrintFile: StatementRow(_print_file, 60.0),
+        Get: StatementRow(_wait_for_port, 30.0),
+        Put: StatementRow(_put, 40.0),
     }
-    _flowing: ClassVar[dict[type, Row]] = {**StatementLowering._flowing, **_waiting, Stop: Row(_stop)}
+    _flowing: ClassVar[dict[type, StatementRow]] = {**StatementLowering._flowing, **_waiting, Stop: StatementRow(_stop)}
     estimates_us: ClassVar[dict[type, float]] = {
         **StatementLowering.estimates_us,
         **{kind: row.estimate_us for kind, row in _waiting.items()},

@@ -233,7 +233,7 @@ def drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
 
 
 @dataclass(frozen=True)
-class Place:
+class ParameterPlace:
     """The place of an output: ``local`` is its Python name, "" where it is in actual memory or in an array.
 
     For an array element ``index`` and ``in_range`` come from its subscripts, evaluated before the block.
@@ -246,15 +246,15 @@ class Place:
     in_range: ast.expr | None = None
 
 
-def places_of(emitter: Emitter, bound: BoundCall) -> list[Place]:
+def places_of(emitter: Emitter, bound: BoundCall) -> list[ParameterPlace]:
     """Return the outputs' places, in the order of the CALL; their subscripts are evaluated here, before the block."""
     declared = {output.name: output for output in bound.block.outputs}
     given = [(declared[name], target) for name, target in bound.arguments.items() if name in declared]
     changing = frozenset(_local(emitter, target) for _, target in given)
-    places: list[Place] = []
+    places: list[ParameterPlace] = []
     for output, target in given:
         assert isinstance(target, (Reference, Element))
-        place = Place(output, target, _local(emitter, target))
+        place = ParameterPlace(output, target, _local(emitter, target))
         if isinstance(target, Element):
             index, in_range = lower_index(emitter, target, changing)
             place = replace(place, index=index, in_range=in_range)
@@ -327,7 +327,7 @@ def _local(emitter: Emitter, target: Expression) -> str:
     return ""
 
 
-def _free(bindings: dict[str, ast.expr], outputs: list[Place]) -> frozenset[str]:
+def _free(bindings: dict[str, ast.expr], outputs: list[ParameterPlace]) -> frozenset[str]:
     """Return the targets in which a block may compute: always written, not read by inputs, used by one output only."""
     read = {name for binding in bindings.values() for name in names_in(binding)}
     targets = [place.local for place in outputs]
@@ -335,7 +335,7 @@ def _free(bindings: dict[str, ast.expr], outputs: list[Place]) -> frozenset[str]
     return frozenset(target for target in always - read if targets.count(target) == 1)
 
 
-def _store_when(emitter: Emitter, test: ast.expr, stores: list[tuple[Place, ast.expr]]) -> None:
+def _store_when(emitter: Emitter, test: ast.expr, stores: list[tuple[ParameterPlace, ast.expr]]) -> None:
     """Emit the stores of outputs that hold: where they are not written, they are not read either."""
     fixed = value_of(test)
     if fixed is not None:
@@ -347,7 +347,7 @@ def _store_when(emitter: Emitter, test: ast.expr, stores: list[tuple[Place, ast.
     emitter.emit(build.when(test, suite))
 
 
-def store_all(emitter: Emitter, stores: list[tuple[Place, ast.expr]]) -> None:
+def store_all(emitter: Emitter, stores: list[tuple[ParameterPlace, ast.expr]]) -> None:
     """Emit the stores of values into outputs."""
     for place, value in stores:
         if place.index is not None:

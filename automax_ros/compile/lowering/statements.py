@@ -62,7 +62,7 @@ GOSUB_TOO_DEEP, RETURN_WITHOUT_GOSUB, OUT_OF_DATA = 7028, 7029, 7030
 STOPPED = "stopped"
 
 
-class Row(NamedTuple):
+class StatementRow(NamedTuple):
     """The lowering of a kind of statement, and its estimated time on a 7010, microseconds; a CALL's is its block's."""
 
     carry_out: Callable[..., None]
@@ -405,26 +405,26 @@ class StatementLowering:
     def _nothing(self, _: Statement) -> None:
         pass
 
-    _flowing: ClassVar[dict[type, Row]] = {
-        Goto: Row(_goto, 2.0),
-        Gosub: Row(_gosub, 4.0),
-        Return: Row(_return, 3.0),
-        OnJump: Row(_flow_on, 5.0),
-        If: Row(_flow_if, 4.0),
-        For: Row(_flow_for, 8.0),
-        Stop: Row(_stop),
-        End: Row(_end),
+    _flowing: ClassVar[dict[type, StatementRow]] = {
+        Goto: StatementRow(_goto, 2.0),
+        Gosub: StatementRow(_gosub, 4.0),
+        Return: StatementRow(_return, 3.0),
+        OnJump: StatementRow(_flow_on, 5.0),
+        If: StatementRow(_flow_if, 4.0),
+        For: StatementRow(_flow_for, 8.0),
+        Stop: StatementRow(_stop),
+        End: StatementRow(_end),
     }
-    _simple: ClassVar[dict[type, Row]] = {
-        Assignment: Row(_assign, 6.0),
-        Call: Row(_call),
-        Print: Row(_print, 60.0),
-        Read: Row(_read, 6.0),
-        Restore: Row(_restore, 2.0),
-        IoWrite: Row(_io_write, 10.0),
-        ClearErrorLog: Row(_clear_log, 4.0),
-        SetEvent: Row(_set_event, 12.0),
-        **dict.fromkeys((Remark, Declaration, Data, Event, Label), Row(_nothing)),
+    _simple: ClassVar[dict[type, StatementRow]] = {
+        Assignment: StatementRow(_assign, 6.0),
+        Call: StatementRow(_call),
+        Print: StatementRow(_print, 60.0),
+        Read: StatementRow(_read, 6.0),
+        Restore: StatementRow(_restore, 2.0),
+        IoWrite: StatementRow(_io_write, 10.0),
+        ClearErrorLog: StatementRow(_clear_log, 4.0),
+        SetEvent: StatementRow(_set_event, 12.0),
+        **dict.fromkeys((Remark, Declaration, Data, Event, Label), StatementRow(_nothing)),
     }
     estimates_us: ClassVar[dict[type, float]] = {
         kind: row.estimate_us for kind, row in (*_flowing.items(), *_simple.items()) if row.estimate_us

@@ -11,7 +11,7 @@ from automax_ros.drive.assess.limits import DEFAULT_PERIOD_STEP_US, DEFAULT_PHAS
 from automax_ros.drive.base.nameplate import DriveParameters
 
 
-class Verdict(enum.Enum):
+class Rating(enum.Enum):
     """Result of a rule for a drive."""
 
     FINE = "fine"
@@ -22,7 +22,7 @@ class Verdict(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Given:
+class GivenValue:
     """A programmed input: its value, None where that is not known, and its origin in words."""
 
     value: float | None
@@ -82,11 +82,11 @@ class DriveCase:
     inertia: float = 1.0
     source_ohm: float = 0.0
     task: str = ""
-    inputs: Mapping[str, Given] = field(default_factory=dict)
-    threshold: Given = Given(DEFAULT_THRESHOLD_DEG, "default")
-    phase_step: Given = Given(DEFAULT_PHASE_STEP_US, "default")
-    period_step: Given = Given(DEFAULT_PERIOD_STEP_US, "default")
-    fast_change: Given = Given(0, "default")
+    inputs: Mapping[str, GivenValue] = field(default_factory=dict)
+    threshold: GivenValue = GivenValue(DEFAULT_THRESHOLD_DEG, "default")
+    phase_step: GivenValue = GivenValue(DEFAULT_PHASE_STEP_US, "default")
+    period_step: GivenValue = GivenValue(DEFAULT_PERIOD_STEP_US, "default")
+    fast_change: GivenValue = GivenValue(0, "default")
     voltage: bool = False
     registers: bool = True
     computing: Computing | None = None
@@ -142,7 +142,7 @@ class Finding:
     """
 
     rule: str
-    verdict: Verdict
+    verdict: Rating
     result: str
     formula: str
     numbers: str = ""
@@ -168,6 +168,6 @@ class DriveFindings:
     findings: tuple[Finding, ...]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Rating:
         """The worst one."""
-        return max((item.verdict for item in self.findings), key=list(Verdict).index, default=Verdict.FINE)
+        return max((item.verdict for item in self.findings), key=list(Rating).index, default=Rating.FINE)

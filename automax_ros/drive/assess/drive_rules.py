@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import ceil, floor
 
 from automax_ros.blocks.cml import ioc_is_possible
-from automax_ros.drive.assess.drive_case import DriveCase, Finding, Verdict
+from automax_ros.drive.assess.drive_case import DriveCase, Finding, Rating
 from automax_ros.drive.assess.limits import (
     DEFAULT_THRESHOLD_DEG,
     LARGEST_THRESHOLD_DEG,
@@ -30,13 +30,13 @@ def line_frequency(case: DriveCase) -> Finding:
     """AC_LINE_FREQ must not be above the lowest frequency of the line (52.1.1)."""
     line_hz, given = case.parameters.line_hz, case.value("AC_LINE_FREQ")
     if given is None:
-        verdict, why = Verdict.ATTENTION, "no task with DC_DRIVE_CML gives it"
+        verdict, why = Rating.ATTENTION, "no task with DC_DRIVE_CML gives it"
     elif given == line_hz:
-        verdict, why = Verdict.FINE, "that of the line"
+        verdict, why = Rating.FINE, "that of the line"
     elif given > line_hz:
-        verdict, why = Verdict.WRONG, "more than the line has: enter the lowest frequency that is expected"
+        verdict, why = Rating.WRONG, "more than the line has: enter the lowest frequency that is expected"
     else:
-        verdict, why = Verdict.ATTENTION, "less than the line has: right only where the frequency falls as low"
+        verdict, why = Rating.ATTENTION, "less than the line has: right only where the frequency falls as low"
     return Finding(
         "AC_LINE_FREQ",
         verdict,
@@ -55,7 +55,7 @@ def tach_loss(case: DriveCase) -> Finding:
         bound = min(delta_bound_deg(volts, line_v), float(LARGEST_THRESHOLD_DEG))
         exact = delta_bound_deg(volts, line_v)
     except ParameterError as error:
-        return Finding("tach loss threshold", Verdict.WRONG, str(error), formula)
+        return Finding("tach loss threshold", Rating.WRONG, str(error), formula)
     numbers = f"180 - ARCOS[(0.75 x {volts:.4g}) / (1.35 x {line_v:.4g})] = {exact:.1f} deg"
     used, jbar = case.threshold.value, _jbar(case)
     return Finding(
@@ -74,14 +74,14 @@ def _bound_text(exact: float) -> str:
     return f"{exact:.1f} deg"
 
 
-def _threshold_verdict(used: float | None, bound: float, jbar: float | None) -> Verdict:
+def _threshold_verdict(used: float | None, bound: float, jbar: float | None) -> Rating:
     if used is None:
-        return Verdict.ATTENTION
+        return Rating.ATTENTION
     if used > bound:
-        return Verdict.WRONG
+        return Rating.WRONG
     if used > DEFAULT_THRESHOLD_DEG and (jbar is None or jbar < LEAST_JBAR_S):
-        return Verdict.ATTENTION if jbar is None else Verdict.WRONG
-    return Verdict.FINE
+        return Rating.ATTENTION if jbar is None else Rating.WRONG
+    return Rating.FINE
 
 
 def _raise_hint(used: float | None, jbar: float | None) -> str:
@@ -109,7 +109,7 @@ def inertia_time(case: DriveCase) -> Finding:
     jbar = _jbar(case)
     if jbar is None:
         result = f"LIM_BAR is {case.text('LIM_BAR')}: the largest torque is not known"
-        return Finding("JBAR", Verdict.ATTENTION, result, formula)
+        return Finding("JBAR", Rating.ATTENTION, result, formula)
     wr2 = case.parameters.motor.inertia_kg_m2 * case.inertia / KG_M2_PER_LB_FT2
     percent = case.value("LIM_BAR") or 0.0
     torque = case.most_n_m * percent / 100
@@ -120,7 +120,7 @@ def inertia_time(case: DriveCase) -> Finding:
         else f"{jbar:.3f} s, less than {LEAST_JBAR_S:g}: leave register 4136 at {DEFAULT_THRESHOLD_DEG}"
     )
     result += f"; T is the {torque:.4g} N m of this plant's armature at LIM_BAR, JBAR is rounded down"
-    verdict = Verdict.FINE if enough else Verdict.ATTENTION
+    verdict = Rating.FINE if enough else Rating.ATTENTION
     pounds = ceil(10 * torque * LB_FT_PER_N_M) / 10
     numbers = f"({wr2:.4g} lb ft2 x {case.base_rpm:.4g} rpm) / (308 x {pounds:.1f} lb ft) = {jbar:.3f} s"
     return Finding("JBAR", verdict, result, formula, numbers, {"jbar_s": jbar, "torque_n_m": torque})
@@ -133,13 +133,13 @@ def line_synchronization(case: DriveCase) -> Finding:
     programmed = f"register 4137: {phase.text}, 4138: {period.text}"
     values = {"register_4137": phase.value, "register_4138": period.value}
     if phase.value is None or period.value is None:
-        verdict, why = Verdict.ATTENTION, "not known whether one is twice the other"
+        verdict, why = Rating.ATTENTION, "not known whether one is twice the other"
     elif min(phase.value, period.value) <= 0:
-        verdict, why = Verdict.WRONG, "neither may be 0 or less: the line sync is lost"
+        verdict, why = Rating.WRONG, "neither may be 0 or less: the line sync is lost"
     elif phase.value != 2 * period.value:
-        verdict, why = Verdict.ATTENTION, "the first is not twice the second: both are used as they are (AMX7117)"
+        verdict, why = Rating.ATTENTION, "the first is not twice the second: both are used as they are (AMX7117)"
     else:
-        verdict, why = Verdict.FINE, "one is twice the other"
+        verdict, why = Rating.FINE, "one is twice the other"
     return Finding("line synchronization", verdict, f"{programmed}; {why}", formula, "", values)
 
 
@@ -151,7 +151,7 @@ def bridge_change(case: DriveCase) -> Finding:
     switched = case.fast_change.value
     values: dict[str, float | None] = {"inductance_mh": inductance, "largest_inductance_mh": None}
     if column is None:
-        verdict = Verdict.ATTENTION if switched != 0 else Verdict.FINE
+        verdict = Rating.ATTENTION if switched != 0 else Rating.FINE
         columns = ", ".join(f"{volts:g}" for volts in TABLE_3_MH_A)
         result = f"table 3 has no column for {case.parameters.line_v:g} V (it has {columns})"
         return Finding("fast bridge change", verdict, result, formula, values=values)
@@ -163,18 +163,18 @@ def bridge_change(case: DriveCase) -> Finding:
     return Finding("fast bridge change", verdict, text, formula, numbers, values)
 
 
-def _change_verdict(case: DriveCase, small: bool) -> tuple[Verdict, str]:
+def _change_verdict(case: DriveCase, small: bool) -> tuple[Rating, str]:
     switched = case.fast_change.value
     state = f"register 4146 bit 0: {case.fast_change.text}"
     if not small:
-        verdict = Verdict.ATTENTION if switched is None else Verdict.WRONG if switched else Verdict.FINE
+        verdict = Rating.ATTENTION if switched is None else Rating.WRONG if switched else Rating.FINE
         return verdict, f"too large, leave it off ({state})"
     if switched == 0:
-        return Verdict.FINE, f"small enough; it is off ({state})"
+        return Rating.FINE, f"small enough; it is off ({state})"
     if not case.voltage:
-        verdict = Verdict.ATTENTION if switched is None else Verdict.WRONG
+        verdict = Rating.ATTENTION if switched is None else Rating.WRONG
         return verdict, f"without the armature voltage at a 57C405 it ends in IOC ({state})"
-    return Verdict.FINE, f"small enough ({state})"
+    return Rating.FINE, f"small enough ({state})"
 
 
 def overcurrent(case: DriveCase) -> Finding:
@@ -183,15 +183,15 @@ def overcurrent(case: DriveCase) -> Finding:
     level, lim_bar = case.value("IOC_THRESH"), case.value("LIM_BAR")
     programmed = f"IOC_THRESH {case.text('IOC_THRESH')}, LIM_BAR {case.text('LIM_BAR')}"
     if level is None or lim_bar is None:
-        return Finding("IOC_THRESH", Verdict.ATTENTION, f"{programmed}: give both to compare them", formula)
+        return Finding("IOC_THRESH", Rating.ATTENTION, f"{programmed}: give both to compare them", formula)
     most = OVERCURRENT_RATIO * lim_bar
     peak = lim_bar + _ripple_percent(case)
     if not ioc_is_possible(int(level), int(lim_bar)):
-        verdict, why = Verdict.WRONG, "IOC calculation error at task initialization: the drive will not run"
+        verdict, why = Rating.WRONG, "IOC calculation error at task initialization: the drive will not run"
     elif level <= peak:
-        verdict, why = Verdict.ATTENTION, f"at LIM_BAR the ripple's peaks reach {peak:.4g} %: it will trip"
+        verdict, why = Rating.ATTENTION, f"at LIM_BAR the ripple's peaks reach {peak:.4g} %: it will trip"
     else:
-        verdict, why = Verdict.FINE, f"above the peaks at LIM_BAR, {peak:.4g} %"
+        verdict, why = Rating.FINE, f"above the peaks at LIM_BAR, {peak:.4g} %"
     numbers = f"{level:g} < {OVERCURRENT_RATIO:g} x {lim_bar:g} = {most:g}; peaks {lim_bar:g} + {peak - lim_bar:.3g} %"
     values = {"ioc_thresh": level, "lim_bar": lim_bar, "most": most, "peak": peak}
     return Finding("IOC_THRESH", verdict, f"{programmed}: {why}", formula, numbers, values)
@@ -208,16 +208,22 @@ def pmi_overcurrent(case: DriveCase) -> Finding:
     lim_bar = case.value("LIM_BAR")
     if lim_bar is None:
         result = "give the plant its motor_overload_ratio"
-        return Finding("overcurrent trip", Verdict.ATTENTION, result, formula)
+        return Finding("overcurrent trip", Rating.ATTENTION, result, formula)
     trip = lim_bar + PMI_TRIP_POINTS
     peak = lim_bar + _ripple_percent(case)
     amps = case.parameters.amps
     if trip > PMI_MOST_TRIP:
-        verdict, why = Verdict.ATTENTION, f"the parameter screen takes {PMI_MOST_TRIP} % of the power module at most"
+        verdict, why = (
+            Rating.ATTENTION,
+            f"the parameter screen takes {PMI_MOST_TRIP} % of the power module at most",
+        )
     elif trip <= peak:
-        verdict, why = Verdict.ATTENTION, f"at the largest current the ripple's peaks reach {peak:.4g} %: it will trip"
+        verdict, why = (
+            Rating.ATTENTION,
+            f"at the largest current the ripple's peaks reach {peak:.4g} %: it will trip",
+        )
     else:
-        verdict, why = Verdict.FINE, f"above the peaks at the largest current, {peak:.4g} %"
+        verdict, why = Rating.FINE, f"above the peaks at the largest current, {peak:.4g} %"
     numbers = f"{amps:.4g} A x ({lim_bar:g} + {PMI_TRIP_POINTS}) % = {amps * trip / 100:.4g} A"
     values = {"lim_bar": lim_bar, "trip": trip, "most": float(PMI_MOST_TRIP), "peak": peak}
     return Finding("overcurrent trip", verdict, f"{trip:g} %: {why}", formula, numbers, values)

@@ -31,7 +31,7 @@ HIGHEST_COS: Final = 0.95
 """Alpha of a preset lies between the angles of this cosine (decision)."""
 
 
-class Stage(enum.IntEnum):
+class ChangeStage(enum.IntEnum):
     """The stage of a change."""
 
     NONE = 0
@@ -53,12 +53,12 @@ class BridgeChange(Stateful):
 
     def __init__(self) -> None:
         self.bridge = 1
-        self.stage = Stage.NONE
+        self.stage = ChangeStage.NONE
 
     def begin(self, bridge: int) -> None:
         """Start with a bridge, without current."""
         self.bridge = bridge
-        self.stage = Stage.NONE
+        self.stage = ChangeStage.NONE
 
     def scan(
         self,
@@ -84,20 +84,20 @@ class BridgeChange(Stateful):
         """
         # The sign decides, from one count on (52.1.2): the time of the change itself prevents chattering.
         against = round(wanted if self.bridge == 2 else -wanted)
-        if self.stage == Stage.NONE:
+        if self.stage == ChangeStage.NONE:
             if against < 1:
                 return False
-            self.stage = Stage.BACK
+            self.stage = ChangeStage.BACK
             if late:
                 return False
         elif against < 0:
-            self.stage = Stage.NONE
+            self.stage = ChangeStage.NONE
             return False
         if measured.tail_us <= 0:
-            self.stage = Stage.BACK
+            self.stage = ChangeStage.BACK
             return False
         if gated or (not fast and measured.tail_us < int(scan_us)):
-            self.stage = Stage.OFF
+            self.stage = ChangeStage.OFF
             return False
         self.begin(3 - self.bridge)
         return True

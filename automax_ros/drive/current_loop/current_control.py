@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from automax_ros.drive.base.state import Stateful
-from automax_ros.drive.current_loop.bridge_change import FLOOR, QUIET, RECOVERY_US, BridgeChange, Stage, preset_us
+from automax_ros.drive.current_loop.bridge_change import FLOOR, QUIET, RECOVERY_US, BridgeChange, ChangeStage, preset_us
 from automax_ros.drive.current_loop.firing import Firing
 from automax_ros.drive.current_loop.regulator import FULL, STEPS, ReferenceChain, Regulator
 from automax_ros.drive.current_loop.signals import RATED, Measured, Pulse, late_us
@@ -200,7 +200,7 @@ class CurrentControl(Stateful):
 
     def _phase_back(self, pll: Pll, reverse: bool) -> tuple[Pulse, ...]:
         """Bring the current of the bridge in use to zero, then turn its gates off."""
-        if self.change.stage == Stage.OFF or (self._late_us and self.part < 1.0):
+        if self.change.stage == ChangeStage.OFF or (self._late_us and self.part < 1.0):
             self.block = True
             self.regulator.begin(0.0)
             return self.off()

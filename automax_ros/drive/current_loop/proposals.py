@@ -24,7 +24,7 @@ LEAST_CONDUCTION: Final = 0.4
 
 
 @dataclass(frozen=True)
-class Circuit:
+class ArmatureCircuit:
     """The data that the gains depend on.
 
     Attributes:
@@ -44,7 +44,7 @@ class Circuit:
 
 def circuit_of(
     parameters: DriveParameters, lim_bar: int, *, choke_h: float = 0.0, source_ohm: float = 0.005
-) -> Circuit:
+) -> ArmatureCircuit:
     """Return the data that the gains of a drive depend on.
 
     Args:
@@ -54,7 +54,7 @@ def circuit_of(
         source_ohm: resistance of a phase of the line, ohm.
     """
     motor, hertz = parameters.motor, parameters.line_hz
-    return Circuit(
+    return ArmatureCircuit(
         parameters.line_v,
         hertz,
         motor.inductance_h + choke_h + 2 * parameters.source_h,
@@ -63,34 +63,34 @@ def circuit_of(
     )
 
 
-def gain_continuous(circuit: Circuit) -> float:
+def gain_continuous(circuit: ArmatureCircuit) -> float:
     """Return the counts that 1 us of DELTA adds in a scan, in continuous conduction: pi / 3 Vd0 1e-6 / L x counts_a."""
     return pi / 3 * VD0 * circuit.line_v * 1e-6 / circuit.inductance_h * circuit.counts_a
 
 
-def kp(circuit: Circuit) -> float:
+def kp(circuit: ArmatureCircuit) -> float:
     """KP = 0.65 / (counts per microsecond of DELTA and scan), in steps of 1/1024, 0 to 4."""
     return min(4.0, max(1.0, round(LOOP_GAIN / gain_continuous(circuit) * STEPS)) / STEPS)
 
 
-def pi_w_lead(circuit: Circuit) -> int:
+def pi_w_lead(circuit: ArmatureCircuit) -> int:
     """PI_W_LEAD = R / L of the whole circuit, rad/s, 10 to 500: it cancels the armature's time constant (decision)."""
     return min(500, max(10, round(circuit.resistance_ohm / circuit.inductance_h)))
 
 
-def cc_thresh(circuit: Circuit) -> int:
+def cc_thresh(circuit: ArmatureCircuit) -> int:
     """CC_THRESH = counts of the current where continuous conduction begins at standstill, 0 to 32767 (decision)."""
     reactance = 2 * pi * circuit.line_hz * circuit.inductance_h
     return min(32767, round(BOUNDARY * VD0 * circuit.line_v / reactance * circuit.counts_a))
 
 
-def ag_factor(circuit: Circuit) -> int:
+def ag_factor(circuit: ArmatureCircuit) -> int:
     """AG_FACTOR = integral gain wanted where 40 % of a scan conduct, over the continuous one, 1 to 300 (decision)."""
     continuous = kp(circuit) * pi_w_lead(circuit) / (6 * circuit.line_hz)
     slope = 3e-6 / BOUNDARY_WAY * circuit.line_hz * cc_thresh(circuit) * LEAST_CONDUCTION**2
     return min(300, max(1, round(INTEGRAL_STEP / slope / continuous)))
 
 
-def ref_lag(circuit: Circuit) -> int:  # noqa: ARG001 - as the others
+def ref_lag(circuit: ArmatureCircuit) -> int:  # noqa: ARG001 - as the others
     """REF_LAG = 400 rad/s: the fastest that 50 and 60 Hz allow; the armature follows no faster (decision)."""
     return 400

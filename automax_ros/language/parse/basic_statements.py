@@ -14,7 +14,7 @@ from automax_ros.language.parse.cursor import Cursor
 from automax_ros.language.parse.declarations import event_word
 from automax_ros.language.parse.expressions import expression, target
 from automax_ros.language.parse.statements import line_number, print_items
-from automax_ros.language.text.tokens import Kind, Token
+from automax_ros.language.text.tokens import Token, TokenKind
 from automax_ros.language.tree import tree
 
 _FORM = "AMX4110"
@@ -47,7 +47,7 @@ def _unit(cursor: Cursor, word: str) -> tree.Unit:
 
 
 def _word(cursor: Cursor, word: str, message: str, form: str) -> None:
-    near = did_you_mean(cursor.current.text, (word,)) if cursor.current.kind is Kind.WORD else None
+    near = did_you_mean(cursor.current.text, (word,)) if cursor.current.kind is TokenKind.WORD else None
     cursor.expect(word, _FORM, f"{message}: {cursor.found()} stands there", near or form)
 
 
@@ -56,7 +56,7 @@ def _file(cursor: Cursor, word: str) -> int:
     if not cursor.accept("#"):
         cursor.fail(_FORM, f"{word} needs # and a number, not {cursor.found()}", f"{word} #1, ...")
     token = cursor.current
-    if token.kind is not Kind.INTEGER or not token.text.isdigit() or not isinstance(token.value, int):
+    if token.kind is not TokenKind.INTEGER or not token.text.isdigit() or not isinstance(token.value, int):
         cursor.fail(_FORM, f"the number after # is an integer constant, not {cursor.found()}")
     cursor.advance()
     cursor.reporter.report_token(token)
@@ -68,7 +68,7 @@ def _comma(cursor: Cursor, form: str) -> None:
 
 
 def _open(cursor: Cursor, start: Token) -> tree.Statement:
-    if cursor.current.kind is Kind.STRING:
+    if cursor.current.kind is TokenKind.STRING:
         return _open_port(cursor)
     _word(cursor, "CHANNEL", f"{start.text} needs CHANNEL or the name of a port", f"{_OPEN_CHANNEL}, or {_OPEN_PORT}")
     _word(cursor, "FOR", "FOR is missing after CHANNEL", _OPEN_CHANNEL)

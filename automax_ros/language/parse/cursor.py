@@ -9,7 +9,7 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import did_you_mean, printable
 from automax_ros.core.types import NAME_LIMIT, bare_name
 from automax_ros.language.text.reporter import Reporter, SyntaxFaultError
-from automax_ros.language.text.tokens import RESERVED_WORDS, Kind, SourceFault, Token
+from automax_ros.language.text.tokens import RESERVED_WORDS, SourceFault, Token, TokenKind
 
 _Item = TypeVar("_Item")
 
@@ -41,7 +41,7 @@ class Cursor:
     def advance(self) -> Token:
         """Read a token; the END token stays the current one."""
         token = self.tokens[self.position]
-        if token.kind is not Kind.END:
+        if token.kind is not TokenKind.END:
             self.position += 1
         return token
 
@@ -69,16 +69,16 @@ class Cursor:
 
     def at_line_end(self) -> bool:
         """Return whether the logical line ends here."""
-        return self.tokens[self.position].kind is Kind.END
+        return self.tokens[self.position].kind is TokenKind.END
 
     def at_separator(self) -> bool:
         """Return whether the current token separates two statements."""
-        return self.tokens[self.position].kind is Kind.SEPARATOR
+        return self.tokens[self.position].kind is TokenKind.SEPARATOR
 
     def fail(self, code: str, message: str, hint: str | None = None, notes: tuple[Note, ...] = ()) -> NoReturn:
         """Raise a syntax error at the current token; a token with a fault raises that fault."""
         token = self.current
-        if token.kind is Kind.ERROR and token.fault is not None:
+        if token.kind is TokenKind.ERROR and token.fault is not None:
             raise SyntaxFaultError(token.fault, token.span)
         raise SyntaxFaultError(SourceFault(code, message, hint), self.here(), notes)
 
@@ -89,9 +89,9 @@ class Cursor:
     def found(self) -> str:
         """The current token, for a message."""
         token = self.current
-        if token.kind is Kind.END:
+        if token.kind is TokenKind.END:
             return "the end of the line"
-        if token.kind is Kind.REMARK:
+        if token.kind is TokenKind.REMARK:
             return "a remark"
         text = printable(token.text)
         return f"`{text}`" if len(text) <= 40 else f"`{text[:40]}...`"
@@ -99,7 +99,7 @@ class Cursor:
     def expect(self, text: str, code: str, message: str, hint: str | None = None) -> Token:
         """Read the word or mark, or raise a syntax error; a misspelt word gets a suggestion."""
         if self.current.text != text:
-            if hint is None and text.isalpha() and self.current.kind is Kind.WORD:
+            if hint is None and text.isalpha() and self.current.kind is TokenKind.WORD:
                 hint = did_you_mean(self.current.text, (text,))
             self.fail(code, message, hint)
         return self.advance()
@@ -133,7 +133,7 @@ class Cursor:
 
     def skip_statement(self) -> None:
         """Move to the end of a statement that could not be read."""
-        while self.current.kind is not Kind.END and self.current.kind is not Kind.SEPARATOR:
+        while self.current.kind is not TokenKind.END and self.current.kind is not TokenKind.SEPARATOR:
             self.position += 1
 
     def skip_line(self) -> None:

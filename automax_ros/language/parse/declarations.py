@@ -8,7 +8,7 @@ from __future__ import annotations
 from automax_ros.core.text import did_you_mean
 from automax_ros.language.parse.cursor import Cursor
 from automax_ros.language.parse.expressions import close_parenthesis, constant, variable
-from automax_ros.language.text.tokens import RESERVED_WORDS, Kind, Token
+from automax_ros.language.text.tokens import RESERVED_WORDS, Token, TokenKind
 from automax_ros.language.tree.functions import FUNCTIONS, REFUSED_FUNCTIONS
 from automax_ros.language.tree.tree import Declaration, Declared, Event, Expression, Reference, Scope, Tuning
 
@@ -33,14 +33,14 @@ def _parse_declared(cursor: Cursor, word: str) -> Declared:
         cursor.fail("AMX0034", f"`{token.text}` is a word of the language and cannot name a variable")
     name = cursor.check_name(cursor.advance())
     length = None
-    if cursor.at(":") and cursor.following.kind is Kind.INTEGER:
+    if cursor.at(":") and cursor.following.kind is TokenKind.INTEGER:
         if not name.endswith("$"):
             cursor.fail("AMX0075", "only a string has a length", f"write {name} without it")
         cursor.advance()
         length = _count(cursor, "the length of a string")
     subscripts: tuple[int, ...] = ()
     after = cursor.tokens[min(cursor.position + 2, len(cursor.tokens) - 1)]
-    begins_tuning = cursor.following.kind is Kind.WORD and after.text == "="
+    begins_tuning = cursor.following.kind is TokenKind.WORD and after.text == "="
     if cursor.at("(") or (cursor.at("[") and not begins_tuning):
         subscripts = _subscripts(cursor)
     tuning = _tuning(cursor) if cursor.at("[") else None
@@ -52,7 +52,7 @@ def _parse_declared(cursor: Cursor, word: str) -> Declared:
 
 def _count(cursor: Cursor, what: str) -> int:
     token = cursor.current
-    if token.kind is not Kind.INTEGER or not isinstance(token.value, int):
+    if token.kind is not TokenKind.INTEGER or not isinstance(token.value, int):
         cursor.fail("AMX0075", f"{what} is an integer constant, not {cursor.found()}")
     cursor.advance()
     cursor.reporter.report_token(token)
@@ -90,8 +90,8 @@ def _tuning(cursor: Cursor) -> Tuning:
 def event_word(cursor: Cursor) -> str:
     """Read the name of an event."""
     token = cursor.current
-    if token.kind is not Kind.WORD or token.text in RESERVED_WORDS:
-        hint = "the name of an event has no type character" if token.kind is Kind.NAME else None
+    if token.kind is not TokenKind.WORD or token.text in RESERVED_WORDS:
+        hint = "the name of an event has no type character" if token.kind is TokenKind.NAME else None
         cursor.fail("AMX0076", f"{cursor.found()} cannot be the name of an event", hint)
     return cursor.check_name(cursor.advance())
 
@@ -114,7 +114,7 @@ def event(cursor: Cursor, _start: Token) -> Event:
         cursor.advance()
         cursor.expect("=", "AMX0035", f"`=` is missing after {key.text}")
         if key.text == "TIMEOUT":
-            if cursor.current.kind is not Kind.INTEGER:
+            if cursor.current.kind is not TokenKind.INTEGER:
                 cursor.fail("AMX0076", f"TIMEOUT needs an integer constant, not {cursor.found()}")
             timeout = _count(cursor, "TIMEOUT")
         else:

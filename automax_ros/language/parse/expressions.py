@@ -11,7 +11,7 @@ from typing import NoReturn
 from automax_ros.core.diagnostics import Span
 from automax_ros.language.parse.cursor import Cursor
 from automax_ros.language.text.constants import LARGEST_REAL, SMALLEST_POSITIVE
-from automax_ros.language.text.tokens import BOOLEAN_WORDS, RESERVED_WORDS, Kind, SourceFault, Token
+from automax_ros.language.text.tokens import BOOLEAN_WORDS, RESERVED_WORDS, SourceFault, Token, TokenKind
 from automax_ros.language.tree import tree
 from automax_ros.language.tree.functions import FUNCTIONS, REFUSED_FUNCTIONS
 
@@ -59,8 +59,11 @@ def constant(cursor: Cursor, what: str) -> tree.Expression:
     """Read a constant, possibly with a sign; ``what`` says in a message what needs one."""
     sign = cursor.advance() if cursor.at("-", "+") else None
     token = cursor.current
-    boolean = token.kind is Kind.WORD and token.text in BOOLEAN_WORDS
-    if not (token.kind in (Kind.INTEGER, Kind.REAL) or (sign is None and (token.kind is Kind.STRING or boolean))):
+    boolean = token.kind is TokenKind.WORD and token.text in BOOLEAN_WORDS
+    if not (
+        token.kind in (TokenKind.INTEGER, TokenKind.REAL)
+        or (sign is None and (token.kind is TokenKind.STRING or boolean))
+    ):
         hint = "a string stands in quotes" if token.is_name and not boolean else None
         cursor.fail("AMX0073", f"{what} needs a constant, not {cursor.found()}", hint)
     value, _ = _literal(cursor, sign is not None and sign.text == "-")
@@ -120,7 +123,7 @@ def _parse_signed(cursor: Cursor, depth: int) -> _Measured:
 def _primary(cursor: Cursor, depth: int, negative: bool) -> _Measured:
     _check_depth(cursor, depth)
     token = cursor.current
-    if token.kind in (Kind.INTEGER, Kind.REAL, Kind.STRING) or token.text in BOOLEAN_WORDS:
+    if token.kind in (TokenKind.INTEGER, TokenKind.REAL, TokenKind.STRING) or token.text in BOOLEAN_WORDS:
         return _literal(cursor, negative)
     if token.is_name and token.text not in RESERVED_WORDS:
         return _parse_named(cursor, depth)
@@ -207,7 +210,7 @@ def close_parenthesis(cursor: Cursor, opened: Span, opening: str = "(") -> None:
     """Raise the error for a parenthesis that is not closed here: another token follows, or its end is missing."""
     closing = _CLOSING[opening]
     token = cursor.current
-    begins_value = token.is_name or token.kind in (Kind.INTEGER, Kind.REAL, Kind.STRING)
+    begins_value = token.is_name or token.kind in (TokenKind.INTEGER, TokenKind.REAL, TokenKind.STRING)
     if begins_value and token.text not in RESERVED_WORDS:
         cursor.fail("AMX0071", f"a comma or an operator is missing before {cursor.found()}")
     column = f"in column {opened.column}" if opened.line == token.span.line else f"in line {opened.line} of the text"

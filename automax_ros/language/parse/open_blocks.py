@@ -16,7 +16,7 @@ NESTING_LIMIT = 16
 
 
 @dataclass
-class Frame:
+class OpenBlock:
     """A block whose end has not been read yet.
 
     ``node`` is its IF or FOR without a body, None where the head was wrong: then ``body`` is the list of the block
@@ -50,8 +50,8 @@ class FrameStack:
 
     def __init__(self, reporter: Reporter) -> None:
         self._reporter = reporter
-        self._module = Frame("TASK", None)
-        self._frames: list[Frame] = []
+        self._module = OpenBlock("TASK", None)
+        self._frames: list[OpenBlock] = []
         self._number: int | None = None
         self._crossed: set[str] = set()
 
@@ -61,7 +61,7 @@ class FrameStack:
         return len(self._frames)
 
     @property
-    def _top(self) -> Frame:
+    def _top(self) -> OpenBlock:
         return self._frames[-1] if self._frames else self._module
 
     def begin_line(self, number: int | None) -> None:
@@ -81,7 +81,9 @@ class FrameStack:
     def open(self, cursor: Cursor, node: If | For, span: Span) -> None:
         """Begin a block; a nesting too deep is reported once."""
         word = "IF" if isinstance(node, If) else "FOR"
-        frame = Frame(word, dataclasses.replace(node, number=self._number, span=span), span, self._reporter.statement)
+        frame = OpenBlock(
+            word, dataclasses.replace(node, number=self._number, span=span), span, self._reporter.statement
+        )
         if self.depth >= NESTING_LIMIT:
             frame.node, frame.body = None, self._top.statements
             if self.depth == NESTING_LIMIT:
@@ -94,7 +96,7 @@ class FrameStack:
         """Begin a block whose head was wrong."""
         self.end_line(span)
         around = self._top.statements
-        self._frames.append(Frame(word, None, span, self._reporter.statement, around, doubtful=doubtful))
+        self._frames.append(OpenBlock(word, None, span, self._reporter.statement, around, doubtful=doubtful))
 
     def close_all(self) -> None:
         """Report and close every block that is still open at the end of the text; an END there belongs to the task."""
@@ -191,7 +193,7 @@ class FrameStack:
             # The end that closed the doubtful block may have been that of the block around it.
             self._top.doubtful = True
 
-    def _refuse_else(self, cursor: Cursor, frame: Frame) -> None:
+    def _refuse_else(self, cursor: Cursor, frame: OpenBlock) -> None:
         cursor.position -= 1
         if frame.word == "IF":
             cursor.fail("AMX0051", "a second ELSE in one IF", None, (Note("the IF stands here", frame.span),))
@@ -215,11 +217,11 @@ class FrameStack:
         return None
 
 
-def _turn_to_else(frame: Frame) -> None:
+def _turn_to_else(frame: OpenBlock) -> None:
     frame.otherwise = [] if frame.node is not None else frame.body
 
 
-def _loops_over(frame: Frame, name: str) -> bool:
+def _loops_over(frame: OpenBlock, name: str) -> bool:
     if frame.word != "FOR":
         return False
     return not isinstance(frame.node, For) or frame.node.variable.name == name

@@ -15,7 +15,7 @@ from automax_ros.language.parse.statements import SIMPLE_STATEMENTS, assignment
 from automax_ros.language.parse.unknown import refuse_statement, refuse_word
 from automax_ros.language.text.lexer import END_OF_FILE, LineReader, LogicalLine
 from automax_ros.language.text.reporter import Reporter, SyntaxFaultError, TooManyProblemsError
-from automax_ros.language.text.tokens import RESERVED_WORDS, STATEMENT_WORDS, Kind, SourceFault, Token
+from automax_ros.language.text.tokens import RESERVED_WORDS, STATEMENT_WORDS, SourceFault, Token, TokenKind
 from automax_ros.language.tree.task_kind import TaskKind, kind_of_source
 from automax_ros.language.tree.tree import Expression, For, Goto, If, Label, Module, Remark, Statement
 
@@ -34,7 +34,7 @@ class StatementReader:
     def read(self, cursor: Cursor) -> None:
         """Read one statement; raises SyntaxFaultError."""
         token = cursor.current
-        if token.kind is Kind.WORD:
+        if token.kind is TokenKind.WORD:
             self._refuse_misspelt(cursor)
             if token.text == "IF":
                 return self._if(cursor)
@@ -53,12 +53,12 @@ class StatementReader:
         """Move past a statement that could not be read, and open or close the block that was meant."""
         first = cursor.tokens[start]
         failed, cursor.position = cursor.position, start
-        word = first.text if first.kind is Kind.WORD else ""
+        word = first.text if first.kind is TokenKind.WORD else ""
         if word == "IF":
             self._recover_if(cursor, first, failed)
             return
         following = cursor.following
-        assigns = following.kind is Kind.OPERATOR
+        assigns = following.kind is TokenKind.OPERATOR
         cursor.skip_statement()
         if word == "FOR" or (word and not assigns and _is_meant(word, "FOR")):
             self._frames.open_wrong("FOR", first.span, doubtful=word != "FOR")
@@ -101,10 +101,10 @@ class StatementReader:
     def _simple(self, cursor: Cursor) -> Statement:
         start = cursor.position
         token = cursor.current
-        read = self._reader(cursor) if token.kind is Kind.WORD else None
+        read = self._reader(cursor) if token.kind is TokenKind.WORD else None
         if read is not None:
             statement = read(cursor, cursor.advance())
-        elif token.kind is Kind.NAME or (token.kind is Kind.WORD and _assigns(cursor)):
+        elif token.kind is TokenKind.NAME or (token.kind is TokenKind.WORD and _assigns(cursor)):
             _check_glued_remark(cursor)
             statement = assignment(cursor)
         else:
@@ -156,10 +156,10 @@ class StatementReader:
         while True:
             statements.append(self._branch_statement(cursor, depth))
             if cursor.at_separator():
-                if cursor.following.kind is Kind.END:
+                if cursor.following.kind is TokenKind.END:
                     return tuple(statements)
                 cursor.advance()
-                if cursor.current.kind is Kind.REMARK or cursor.at("ELSE"):
+                if cursor.current.kind is TokenKind.REMARK or cursor.at("ELSE"):
                     return tuple(statements)
             elif cursor.at("ELSE"):
                 return tuple(statements)
@@ -172,10 +172,10 @@ class StatementReader:
         start = cursor.position
         if cursor.at_end():
             cursor.fail("AMX0036", f"a statement is missing after {cursor.previous.text}")
-        if token.kind is Kind.INTEGER and token.text.isdigit() and isinstance(token.value, int):
+        if token.kind is TokenKind.INTEGER and token.text.isdigit() and isinstance(token.value, int):
             cursor.advance()
             return Goto(token.value, span=token.span)
-        if token.kind is Kind.WORD:
+        if token.kind is TokenKind.WORD:
             self._refuse_behind_then(cursor)
         if token.text == "IF":
             condition = self._condition(cursor)
@@ -200,11 +200,11 @@ class StatementReader:
             cursor.fail("AMX0077", "FOR needs a simple variable, not an array element")
         cursor.expect("=", "AMX0035", f"`=` is missing after FOR {control.name[:20]}", form)
         first = expression(cursor)
-        hint = (did_you_mean(cursor.current.text, ("TO",)) or form) if cursor.current.kind is Kind.WORD else form
+        hint = (did_you_mean(cursor.current.text, ("TO",)) or form) if cursor.current.kind is TokenKind.WORD else form
         cursor.expect("TO", "AMX0061", f"TO is missing before {cursor.found()}", hint)
         last = expression(cursor)
         step = expression(cursor) if cursor.accept("STEP") else None
-        if cursor.current.kind is Kind.WORD and step is None:
+        if cursor.current.kind is TokenKind.WORD and step is None:
             near = did_you_mean(cursor.current.text, ("STEP",))
             cursor.fail("AMX0036", f"{cursor.found()} is not expected here", near)
         cursor.expect_end()
@@ -243,7 +243,7 @@ def _assigns(cursor: Cursor) -> bool:
     if cursor.following.text not in ("(", "["):
         return cursor.following.text == "="
     inside = cursor.tokens[cursor.position + 2 : cursor.position + 4]
-    if len(inside) < 2 or inside[0].kind is not Kind.WORD or inside[1].text != "=":
+    if len(inside) < 2 or inside[0].kind is not TokenKind.WORD or inside[1].text != "=":
         return True
     return _assigned_behind_parenthesis(cursor)
 
@@ -333,7 +333,7 @@ class _TaskParser:
             cursor.accept("\\")
             return
         try:
-            if cursor.current.kind is Kind.REMARK:
+            if cursor.current.kind is TokenKind.REMARK:
                 self._frames.add(_remark(cursor.advance()))
                 return
             self._statements.read(cursor)

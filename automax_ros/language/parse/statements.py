@@ -8,18 +8,18 @@ from automax_ros.core.diagnostics import Note
 from automax_ros.language.parse.cursor import Cursor
 from automax_ros.language.parse.declarations import declaration, event, event_word
 from automax_ros.language.parse.expressions import constant, expression, target
-from automax_ros.language.text.tokens import Kind, Token
+from automax_ros.language.text.tokens import Token, TokenKind
 from automax_ros.language.tree import tree
 
 
 def call(cursor: Cursor, start: Token) -> tree.Call:
     """Read block(KEYWORD = value, ...), after CALL."""
-    if cursor.current.kind is not Kind.WORD:
+    if cursor.current.kind is not TokenKind.WORD:
         cursor.fail("AMX0070", f"{start.text} needs the name of a block, not {cursor.found()}")
     block = cursor.advance()
     if not cursor.at("("):
         hint = f"CALL {block.text[:20]}(INPUT = ..., OUTPUT = ...)"
-        if cursor.current.kind is Kind.WORD:
+        if cursor.current.kind is TokenKind.WORD:
             hint = f"names of blocks have no blanks: CALL {block.text[:20]}_{cursor.current.text[:20]}("
         cursor.fail("AMX0070", f"`(` is missing after {block.text[:20]}", hint)
     opening = cursor.advance()
@@ -36,9 +36,9 @@ def _argument(cursor: Cursor) -> tree.Argument:
     key = cursor.current
     if cursor.at(")"):
         cursor.fail("AMX0070", "a parameter is missing between `,` and `)`", "remove the comma")
-    if key.kind is Kind.END:
+    if key.kind is TokenKind.END:
         cursor.fail("AMX0042", "`)` is missing at the end of the parameters", "a line that goes on ends with `&`")
-    if key.kind is not Kind.WORD:
+    if key.kind is not TokenKind.WORD:
         hint = f"write KEYWORD = {key.text[:20]}" if key.is_name else None
         cursor.fail("AMX0070", f"a parameter begins with its keyword, not with {cursor.found()}", hint)
     cursor.advance()
@@ -56,7 +56,7 @@ def _expect_comma(cursor: Cursor, opening: Token) -> None:
     if cursor.accept(","):
         return
     note = (Note("the parameters begin here", opening.span),)
-    if cursor.current.kind is Kind.WORD and cursor.following.text == "=":
+    if cursor.current.kind is TokenKind.WORD and cursor.following.text == "=":
         cursor.fail("AMX0071", f"a comma is missing before {cursor.found()}")
     if cursor.at_end():
         cursor.fail("AMX0042", "`)` is missing at the end of the parameters", "a line that goes on ends with `&`", note)
@@ -66,7 +66,7 @@ def _expect_comma(cursor: Cursor, opening: Token) -> None:
 def line_number(cursor: Cursor, word: str) -> int:
     """Read the line number that a jump names."""
     token = cursor.current
-    if token.kind is not Kind.INTEGER or not token.text.isdigit() or not isinstance(token.value, int):
+    if token.kind is not TokenKind.INTEGER or not token.text.isdigit() or not isinstance(token.value, int):
         cursor.fail("AMX0062", f"{word} needs a line number, not {cursor.found()}")
     cursor.advance()
     cursor.reporter.report_token(token)
@@ -86,7 +86,7 @@ def print_items(cursor: Cursor) -> tree.Print:
             continue
         separators.append("")
         named = cursor.current.is_name and not cursor.at("ELSE", "REM")
-        if named or cursor.current.kind is Kind.STRING:
+        if named or cursor.current.kind is TokenKind.STRING:
             cursor.fail("AMX0071", f"`,` or `;` is missing before {cursor.found()}")
         break
     return tree.Print(tuple(items), tuple(separators))
@@ -110,7 +110,7 @@ def _on(cursor: Cursor, start: Token) -> tree.OnJump:
         cursor.fail("AMX0063", f"GOTO or GOSUB is missing after {start.text}", "ON value GOTO line, line, ...")
     word = cursor.advance().text
     lines = cursor.separated(lambda: line_number(cursor, word))
-    if cursor.current.kind is Kind.INTEGER:
+    if cursor.current.kind is TokenKind.INTEGER:
         cursor.fail("AMX0071", f"a comma is missing before {cursor.found()}")
     return tree.OnJump(selector, lines, word == "GOSUB")
 

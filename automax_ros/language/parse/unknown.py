@@ -7,7 +7,7 @@ from typing import NoReturn
 from automax_ros.core.text import did_you_mean
 from automax_ros.language.parse.cursor import Cursor
 from automax_ros.language.text.lexer import TYPE_CHARACTERS
-from automax_ros.language.text.tokens import BASIC_TASK_WORDS, RESERVED_WORDS, STATEMENT_WORDS, Kind
+from automax_ros.language.text.tokens import BASIC_TASK_WORDS, RESERVED_WORDS, STATEMENT_WORDS, TokenKind
 from automax_ros.language.tree.task_kind import TaskKind
 
 FOREIGN_WORDS = {
@@ -60,8 +60,8 @@ def refuse_statement(cursor: Cursor) -> NoReturn:
     """Raise the error for a token that begins no statement at all."""
     token = cursor.current
     hint: str | None = None
-    if token.kind is Kind.WORD:
-        if cursor.following.kind is Kind.ERROR and cursor.following.text in tuple(TYPE_CHARACTERS):
+    if token.kind is TokenKind.WORD:
+        if cursor.following.kind is TokenKind.ERROR and cursor.following.text in tuple(TYPE_CHARACTERS):
             cursor.advance()
         if token.text in ("THEN", "TO", "STEP", "AND", "OR", "XOR", "NOT"):
             hint = "did the line before it need an `&` at its end?"
@@ -70,7 +70,7 @@ def refuse_statement(cursor: Cursor) -> NoReturn:
         if hint is None and cursor.following.text == "(":
             hint = f"a block is called by CALL {token.text[:20]}("
         cursor.fail("AMX0030", f"{cursor.found()} is not a statement", hint)
-    if token.kind is Kind.INTEGER:
+    if token.kind is TokenKind.INTEGER:
         hint = "a line has one line number"
     elif token.text == "/":
         hint = "a remark begins with REM or `!`"

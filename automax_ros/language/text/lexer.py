@@ -14,7 +14,7 @@ from automax_ros.core.diagnostics import Note, SourceText, Span
 from automax_ros.core.text import printable
 from automax_ros.language.text.constants import hexadecimal_fault, integer_value, real_fault, string_fault
 from automax_ros.language.text.reporter import Reporter
-from automax_ros.language.text.tokens import OPERATOR_WORDS, STATEMENT_WORDS, Kind, SourceFault, Token
+from automax_ros.language.text.tokens import OPERATOR_WORDS, STATEMENT_WORDS, SourceFault, Token, TokenKind
 
 BLANKS = " \t\f"
 _TOKEN = re.compile(
@@ -46,7 +46,7 @@ _FOREIGN = {
     ">>": "write SHIFTR%(value, places)",
     "!=": "`not equal` is written `<>`",
 }
-_PLAIN = {"mark": Kind.MARK, "separator": Kind.SEPARATOR}
+_PLAIN = {"mark": TokenKind.MARK, "separator": TokenKind.SEPARATOR}
 TYPE_CHARACTERS = "%!@$"
 BROKEN_END = "&!"
 """Text of an ERROR token after which the statement still continues in the next line."""
@@ -89,7 +89,7 @@ class LineLexer:
         """Return the remark from index ``start`` to the end of the line; its text begins after ``mark``."""
         body = text[start + len(mark) :].strip(BLANKS)
         end = len(text.rstrip(BLANKS))
-        return Token(Kind.REMARK, mark.upper(), line, start + 1, max(end, start + 1) + 1, value=body)
+        return Token(TokenKind.REMARK, mark.upper(), line, start + 1, max(end, start + 1) + 1, value=body)
 
     def _token(self, match: re.Match[str], line: int, before: list[Token]) -> Token:
         group, text = match.lastgroup, match.group()
@@ -98,9 +98,11 @@ class LineLexer:
             return self._name(match, line, before)
         if group == "operator":
             sign = text if len(text) == 1 else text[0] + text[-1]
-            return Token(Kind.OPERATOR, "<>" if sign == "><" else sign, line, column, end_column)
+            return Token(TokenKind.OPERATOR, "<>" if sign == "><" else sign, line, column, end_column)
         if group == "string":
-            return Token(Kind.STRING, text, line, column, end_column, value=text[1:-1], fault=string_fault(text[1:-1]))
+            return Token(
+                TokenKind.STRING, text, line, column, end_column, value=text[1:-1], fault=string_fault(text[1:-1])
+            )
         if group == "foreign":
             return _foreign(text[0] + text[-1] if len(text) > 1 else text, Span(line, column, end_column))
         return self._number(match, Span(line, column, end_column))
@@ -113,7 +115,9 @@ class LineLexer:
             self._saw_lower(text, Span(line, column, end_column))
         if upper == "REM" and _begins_statement(before):
             return self.remark(match.string, line, match.start(), text)
-        return Token(Kind.NAME if upper[-1] in TYPE_CHARACTERS else Kind.WORD, upper, line, column, end_column)
+        return Token(
+            TokenKind.NAME if upper[-1] in TYPE_CHARACTERS else TokenKind.WORD, upper, line, column, end_column
+        )
 
     def _number(self, match: re.Match[str], span: Span) -> Token:
         text, source, end = match.group(), match.string, match.end()
@@ -126,11 +130,11 @@ class LineLexer:
             self._saw_lower(text, span)
         if match.lastgroup == "hex":
             value, fault = hexadecimal_fault(upper)
-            return Token(Kind.INTEGER, upper, *place, value=value, fault=fault)
+            return Token(TokenKind.INTEGER, upper, *place, value=value, fault=fault)
         if upper.isdigit():
             value, fault = integer_value(upper)
-            return Token(Kind.INTEGER, upper, *place, value=value, fault=fault)
-        return Token(Kind.REAL, upper, *place, value=float(upper), fault=real_fault(upper))
+            return Token(TokenKind.INTEGER, upper, *place, value=value, fault=fault)
+        return Token(TokenKind.REAL, upper, *place, value=float(upper), fault=real_fault(upper))
 
     def _other(self, text: str, here: Span, before: list[Token]) -> Token:
         position = here.column - 1
@@ -146,7 +150,7 @@ class LineLexer:
             return _open_string(text, here)
         if char in "%@$" and before and before[-1].is_name:
             name = before[-1]
-            hint = f"write {name.text[:40]}{char} without a blank" if name.kind is Kind.WORD else None
+            hint = f"write {name.text[:40]}{char} without a blank" if name.kind is TokenKind.WORD else None
             return _error(char, here, "AMX0029", f"the type character `{char}` is apart from its name", hint)
         strange = _STRANGE.match(text, position)
         if strange is not None:
@@ -160,11 +164,11 @@ class LineLexer:
 
 
 def _begins_statement(before: list[Token]) -> bool:
-    return not before or before[-1].kind is Kind.SEPARATOR or before[-1].text in ("THEN", "ELSE")
+    return not before or before[-1].kind is TokenKind.SEPARATOR or before[-1].text in ("THEN", "ELSE")
 
 
 def _error(text: str, span: Span, code: str, message: str, hint: str | None) -> Token:
-    return Token(Kind.ERROR, text, span.line, span.column, span.end_column, fault=SourceFault(code, message, hint))
+    return Token(TokenKind.ERROR, text, span.line, span.column, span.end_column, fault=SourceFault(code, message, hint))
 
 
 def _foreign(text: str, span: Span) -> Token:
@@ -185,7 +189,7 @@ def _bad_number(text: str, tail: str, span: Span) -> Token:
 def _ampersand(text: str, here: Span) -> Token:
     rest = text[here.column : here.column + 200].strip(BLANKS) or text[here.column :].strip(BLANKS)
     if not rest:
-        return Token(Kind.CONTINUE, "&", here.line, here.column, here.end_column)
+        return Token(TokenKind.CONTINUE, "&", here.line, here.column, here.end_column)
     remark = rest[0] == "!"
     hint = "a remark may stand on the statement's first or last line" if remark else "`and` is written AND"
     if rest[0] in "Hh":
@@ -317,7 +321,7 @@ class LineReader:
     def _report_missing_number(self, line: LogicalLine) -> None:
         first = line.tokens[0]
         line.faulty = True
-        if first.kind is Kind.ERROR and first.fault is not None:
+        if first.kind is TokenKind.ERROR and first.fault is not None:
             self._reporter.report(first.fault, first.span)
             return
         hint = "begin the line with a number, or end the line before it with `&`"
@@ -339,7 +343,7 @@ class LineReader:
                 found = self.lexer.tokens(text, row, start, offset)
                 nesting.add(found)
                 tokens.extend(found)
-                if tokens and tokens[-1].kind is Kind.REMARK:
+                if tokens and tokens[-1].kind is TokenKind.REMARK:
                     remark.append(str(tokens[-1].value))
             start = 0
             written = len(text.rstrip(BLANKS))
@@ -349,7 +353,7 @@ class LineReader:
             offset += len(text) + 1
         if remark:
             tokens[-1] = tokens[-1]._replace(value="\n".join(remark))
-        tokens.append(Token(Kind.END, "", end.line, end.column, end.end_column, offset + written))
+        tokens.append(Token(TokenKind.END, "", end.line, end.column, end.end_column, offset + written))
 
     def _goes_on(self, line: LogicalLine, remark: list[str], nesting: _Nesting, end: Span) -> bool:
         last = line.tokens[-1] if line.tokens else None
@@ -360,8 +364,8 @@ class LineReader:
             if continues:
                 remark[-1] = remark[-1][:-1].strip(BLANKS)
         else:
-            continues = last is not None and (last.kind is Kind.CONTINUE or last.text == BROKEN_END)
-            if last is not None and last.kind is Kind.CONTINUE:
+            continues = last is not None and (last.kind is TokenKind.CONTINUE or last.text == BROKEN_END)
+            if last is not None and last.kind is TokenKind.CONTINUE:
                 line.tokens.pop()
         if continues:
             return self._checked_continuation(line, following, mark)
@@ -401,7 +405,7 @@ class _Nesting:
 
     def add(self, tokens: list[Token]) -> None:
         for token in tokens:
-            if token.kind is Kind.SEPARATOR:
+            if token.kind is TokenKind.SEPARATOR:
                 self._depth, self._first = 0, None
             else:
                 self._first = self._first or token
@@ -410,8 +414,8 @@ class _Nesting:
 
     @property
     def unfinished(self) -> bool:
-        if self._last is None or self._last.kind is Kind.REMARK:
+        if self._last is None or self._last.kind is TokenKind.REMARK:
             return False
         if self._last.text == ",":
             return self._first is not None and self._first.text != "PRINT"
-        return self._depth > 0 or self._last.kind is Kind.OPERATOR or self._last.text in OPERATOR_WORDS
+        return self._depth > 0 or self._last.kind is TokenKind.OPERATOR or self._last.text in OPERATOR_WORDS

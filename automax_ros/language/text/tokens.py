@@ -8,7 +8,7 @@ from typing import NamedTuple
 from automax_ros.core.diagnostics import Span
 
 
-class Kind(enum.Enum):
+class TokenKind(enum.Enum):
     """The kinds of tokens; the values are their names in messages."""
 
     WORD = "word"
@@ -27,12 +27,12 @@ class Kind(enum.Enum):
     @property
     def ends_segment(self) -> bool:
         """Whether the line ends here, or the part of it before the next statement."""
-        return self in (Kind.END, Kind.SEPARATOR)
+        return self in (TokenKind.END, TokenKind.SEPARATOR)
 
     @property
     def ends_statement(self) -> bool:
         """Whether a statement can end before such a token."""
-        return self in (Kind.END, Kind.SEPARATOR, Kind.REMARK)
+        return self in (TokenKind.END, TokenKind.SEPARATOR, TokenKind.REMARK)
 
 
 class SourceFault(NamedTuple):
@@ -50,7 +50,7 @@ class Token(NamedTuple):
     on any other kind it is reported and the token is used as usual.
     """
 
-    kind: Kind
+    kind: TokenKind
     text: str
     line: int
     column: int
@@ -67,7 +67,7 @@ class Token(NamedTuple):
     @property
     def is_name(self) -> bool:
         """A word, or a name with a type character."""
-        return self.kind is Kind.WORD or self.kind is Kind.NAME
+        return self.kind is TokenKind.WORD or self.kind is TokenKind.NAME
 
 
 STATEMENT_WORDS = frozenset(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from automax_ros.core.types import DataType
 
 
-class Argument(enum.Enum):
+class ArgumentKind(enum.Enum):
     """Kind of an argument."""
 
     NUMBER = "number"
@@ -60,7 +60,7 @@ class Function:
     """
 
     name: str
-    arguments: tuple[Argument, ...]
+    arguments: tuple[ArgumentKind, ...]
     result: Result
     text: str
     repeats: bool = False
@@ -73,7 +73,7 @@ class Function:
         return MOST_ARGUMENTS if self.repeats else len(self.arguments)
 
 
-_N, _I, _S = Argument.NUMBER, Argument.INTEGER, Argument.STRING
+_N, _I, _S = ArgumentKind.NUMBER, ArgumentKind.INTEGER, ArgumentKind.STRING
 
 
 def _word(name: str, what: str) -> Function:

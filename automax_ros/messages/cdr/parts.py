@@ -51,7 +51,7 @@ def size_of(code: str) -> int:
     return struct.calcsize(f"<{code}")
 
 
-class Layout:
+class CdrLayout:
     """Builds the format of a struct with CDR's padding; ``position`` counts from the beginning of the header."""
 
     def __init__(self, position: int) -> None:
@@ -86,7 +86,7 @@ def number_layouts(codes: str) -> tuple[struct.Struct, ...]:
     """Return the packing of single numbers for each position modulo 8 at which they can start."""
     layouts = []
     for position in range(8):
-        layout = Layout(position)
+        layout = CdrLayout(position)
         for code in codes:
             layout.add(code)
         layouts.append(layout.packing())
@@ -115,7 +115,7 @@ def whole_packings(plan: Sequence[tuple[str, str]]) -> Packings:
     """
 
     def layout_of(sizes: tuple[int, ...]) -> str:
-        layout, following = Layout(len(HEADER)), iter(sizes)
+        layout, following = CdrLayout(len(HEADER)), iter(sizes)
         for word, codes in plan:
             size = 0 if word == "numbers" else next(following)
             if word == "text":
@@ -134,7 +134,7 @@ def sequence_packings(codes: str) -> Packings:
     """Return the packings of neighbouring sequences of numbers, by the position modulo 8 and the length of each."""
 
     def layout_of(place: tuple[int, ...]) -> str:
-        layout = Layout(place[0])
+        layout = CdrLayout(place[0])
         for code, count in zip(codes, place[1:], strict=True):
             layout.add_sequence(code, count)
         return layout.text
@@ -232,7 +232,7 @@ def together(codes: str) -> Together:
     layouts: dict[int, struct.Struct] = {}
 
     def build(count: int, position: int) -> struct.Struct:
-        layout = Layout(position)
+        layout = CdrLayout(position)
         for code in codes:
             layout.add_sequence(code, count)
         layouts[count << 3 | position] = made = layout.packing()

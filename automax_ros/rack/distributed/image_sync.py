@@ -24,7 +24,7 @@ from automax_ros.rack.base.stop_cause import StopCause
 from automax_ros.rack.distributed.versions import AS_INSTALLED, TAKEN, Key, Version, VersionedValue, Versions, merged
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.writers import PRESET_WRITER
-from automax_ros.runtime.memory.registers import Part
+from automax_ros.runtime.memory.registers import RegisterPart
 from automax_ros.runtime.memory.views import MemoryValueError, WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Task
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
@@ -273,7 +273,7 @@ class ImageSync:
         if self._memory.read_now(view, element) != value:
             self._rack.inputs.write(view, element, value, writer, kind)
 
-    def _write_bits(self, parts: Sequence[Part], writer: int, kind: WriteKind) -> None:
+    def _write_bits(self, parts: Sequence[RegisterPart], writer: int, kind: WriteKind) -> None:
         for part in parts:
             before = int(self._memory.read_now(part.bank, part.register))
             self._write(part.bank, part.register, merged(before, [part]), writer, kind)
@@ -310,7 +310,7 @@ class ImageSync:
         memory_slot = self._rack.config.common_memory_slot
         own = (time_ns, memory_slot, 0) if common else (time_ns, self.process_slot, self.sequence)
         version = AS_INSTALLED if preset else own
-        repairs: list[Part | VersionedValue] = []
+        repairs: list[RegisterPart | VersionedValue] = []
         sent = []
         for view, element, value in entries:
             if kind in _FORCES:
@@ -334,7 +334,7 @@ class ImageSync:
         else:
             self._memory.release(force.view, force.element, PRESET_WRITER)
 
-    def _repair(self, repairs: Iterable[Part | VersionedValue]) -> None:
+    def _repair(self, repairs: Iterable[RegisterPart | VersionedValue]) -> None:
         memory = self._memory
         memory.now_ns = self._rack.now_ns
         for item in repairs:

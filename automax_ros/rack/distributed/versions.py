@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from automax_ros.core.types import Value
-from automax_ros.runtime.memory.registers import WORD, Part, RegisterMap
+from automax_ros.runtime.memory.registers import WORD, RegisterMap, RegisterPart
 
 Version = tuple[int, int, int]
 """Rack time (ns), slot of the process, number of the message."""
@@ -37,7 +37,7 @@ class MergeResult:
     """Whether a write is to be applied as a ``whole``, else the newer bits of registers (``rest``) to write instead."""
 
     whole: bool
-    rest: tuple[Part, ...] = ()
+    rest: tuple[RegisterPart, ...] = ()
 
 
 TAKEN = MergeResult(whole=True)
@@ -66,13 +66,13 @@ class Versions:
             return TAKEN
         return MergeResult(whole=False, rest=tuple(part for part in rest if part.mask))
 
-    def settle_bits(self, held: VersionedValue) -> tuple[Part, ...]:
+    def settle_bits(self, held: VersionedValue) -> tuple[RegisterPart, ...]:
         """Record the bits of a register in another image that are newer; return what to write, if anything."""
-        part = Part(held.view, held.element, int(held.value) & WORD, held.mask & WORD)
+        part = RegisterPart(held.view, held.element, int(held.value) & WORD, held.mask & WORD)
         mask = self._settle_bits(part, held.version)
         return (part._replace(mask=mask),) if mask else ()
 
-    def newest(self, view: int, element: int, value: Value) -> Iterator[Part | VersionedValue]:
+    def newest(self, view: int, element: int, value: Value) -> Iterator[RegisterPart | VersionedValue]:
         """Yield the values held that a late write of this process must not replace, to be restored."""
         if view not in self._registers.views:
             version, held = self._plain[view, element]
@@ -81,7 +81,7 @@ class Versions:
         for part in self._registers.parts(view, element, value):
             for mask, bits, _ in self._bits.get((part.bank, part.register), ()):
                 if mask & part.mask:
-                    yield Part(part.bank, part.register, bits, mask & part.mask)
+                    yield RegisterPart(part.bank, part.register, bits, mask & part.mask)
 
     def all(self) -> Iterator[VersionedValue]:
         """Yield all values that were written, for another process's image."""
@@ -91,7 +91,7 @@ class Versions:
             for mask, bits, version in pieces:
                 yield VersionedValue(view, element, bits, mask, version)
 
-    def _settle_bits(self, part: Part, version: Version) -> int:
+    def _settle_bits(self, part: RegisterPart, version: Version) -> int:
         """Record the bits of a register that are newer; return their mask."""
         key, mask = (part.bank, part.register), part.mask
         kept: list[tuple[int, int, Version]] = []
@@ -108,7 +108,7 @@ class Versions:
         return mask
 
 
-def merged(before: int, parts: Sequence[Part]) -> int:
+def merged(before: int, parts: Sequence[RegisterPart]) -> int:
     """Return a register's word, with its sign, after some of its bits were replaced."""
     word = before & WORD
     for part in parts:

@@ -10,7 +10,7 @@ from math import floor
 from automax_ros.core.diagnostics import Diagnostic
 from automax_ros.language.program import BoundCall, Program, Symbol
 from automax_ros.language.tree.tree import Scope
-from automax_ros.rackfile.model.config import Point, RackConfig
+from automax_ros.rackfile.model.config import IoPoint, RackConfig
 from automax_ros.rackfile.model.module import ModuleConfig, TaskConfig
 from automax_ros.rackfile.modules.drive import DRIVE_CONTROLLER, DriveConfig
 from automax_ros.rackfile.modules.io import DRIVE_MODEL
@@ -151,7 +151,7 @@ class _Loops:
                 yield name, Diagnostic("AMX6493", message, symbol.span, hint=hint)
 
 
-def latched_registers(config: RackConfig, program: Program) -> Iterator[tuple[Symbol, Point, int]]:
+def latched_registers(config: RackConfig, program: Program) -> Iterator[tuple[Symbol, IoPoint, int]]:
     """Yield the registers of any 57C406 that a control-block task latches: variable, point, line of the rack file."""
     slots = {module.slot for module in config.modules if isinstance(module, DriveConfig)}
     points = {item.name: item for item in config.declared if item.point is not None and item.point.slot in slots}

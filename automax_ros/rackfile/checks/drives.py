@@ -14,7 +14,7 @@ from automax_ros.compile.scan_times import command_ns
 from automax_ros.core.ticks import NS_PER_US
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
-from automax_ros.drive.assess.drive_case import Computing, DriveCase, Given, Unjudged
+from automax_ros.drive.assess.drive_case import Computing, DriveCase, GivenValue, Unjudged
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.plant import PlantData
 from automax_ros.language.checks.rules.constant_values import constant_value
@@ -23,7 +23,7 @@ from automax_ros.language.program import BoundCall, Program, places_that_write
 from automax_ros.language.tree.tree import Assignment, Expression, FunctionCall, Reference, Scope, Unary
 from automax_ros.language.tree.walk import statements_in_order
 from automax_ros.rackfile.checks.register_writes import numbered_writes
-from automax_ros.rackfile.model.config import Point, RackConfig, Timing
+from automax_ros.rackfile.model.config import IoPoint, RackConfig, Timing
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.plants import PlantConfig, plant_data
 from automax_ros.rackfile.modules.drive import DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
@@ -95,7 +95,7 @@ def rack_drives(config: RackConfig, programs: Iterable[Program]) -> list[RackDri
 
 def given_inputs(
     drive: RackDrive, config: RackConfig, programs: Iterable[Program], settings: Mapping[str, Value]
-) -> dict[str, Given]:
+) -> dict[str, GivenValue]:
     """Return the programmed inputs of a drive's current minor loop, by keyword, defaults included.
 
     Of a loop that is in no task only LIM_BAR is known, which is the drive's Motor Overload Ratio (36).
@@ -106,7 +106,7 @@ def given_inputs(
     call = drive.call
     if call is None or drive.program is None:
         ratio = drive.plant.motor_overload_ratio if drive.plant is not None else None
-        return {} if ratio is None else {"LIM_BAR": Given(ratio, f"{ratio} (motor_overload_ratio)")}
+        return {} if ratio is None else {"LIM_BAR": GivenValue(ratio, f"{ratio} (motor_overload_ratio)")}
     assigned: dict[str, Value | None] = {}
     for program in programs:
         for name, value in written_constants(program, Scope.COMMON).items():
@@ -120,9 +120,9 @@ def given_inputs(
     return given
 
 
-def _make_given(value: Value | None, text: str, source: str = "") -> Given:
+def _make_given(value: Value | None, text: str, source: str = "") -> GivenValue:
     number = float(value) if isinstance(value, (bool, int, float)) else None
-    return Given(number, f"{text} ({source})" if source else text)
+    return GivenValue(number, f"{text} ({source})" if source else text)
 
 
 def _evaluate_programmed(
@@ -131,7 +131,7 @@ def _evaluate_programmed(
     config: RackConfig,
     assigned: Mapping[str, Value | None],
     settings: Mapping[str, Value],
-) -> Given:
+) -> GivenValue:
     value = constant_value(expression)
     if value is not None:
         return _make_given(value, source_text(value))
@@ -258,10 +258,10 @@ class _Registers:
     slot: int
     programs: Sequence[Program]
 
-    def given(self, register: int) -> Given:
+    def given(self, register: int) -> GivenValue:
         return _of(self._words(register), DEFAULTS[register])
 
-    def bit_0(self, register: int) -> Given:
+    def bit_0(self, register: int) -> GivenValue:
         words = [None if word is None else word & 1 for word in self._words(register)]
         return _of([*words, *self._points(register, 0)], DEFAULTS[register] & 1)
 
@@ -270,7 +270,7 @@ class _Registers:
         return [*self._points(register, None), *numbered]
 
     def _points(self, register: int, bit: int | None) -> list[int | None]:
-        place = Point(self.slot, register, bit)
+        place = IoPoint(self.slot, register, bit)
         names = {variable.name for variable in self.config.declared if variable.point == place}
         written = (
             item
@@ -280,9 +280,9 @@ class _Registers:
         return [None if value is None else int(value) for name, value in written if name in names]
 
 
-def _of(written: Sequence[int | None], default: int) -> Given:
+def _of(written: Sequence[int | None], default: int) -> GivenValue:
     if not written:
-        return Given(default, f"{default} (default)")
+        return GivenValue(default, f"{default} (default)")
     if None in written or len(set(written)) > 1:
-        return Given(None, "written by tasks, value not known")
-    return Given(written[0], f"{written[0]} (written by a task)")
+        return GivenValue(None, "written by tasks, value not known")
+    return GivenValue(written[0], f"{written[0]} (written by a task)")

@@ -40,7 +40,7 @@ class ModuleLoss(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Point:
+class IoPoint:
     """Place of an I/O point: slot, (first) register, and the bit (0 to 15) of a BOOLEAN."""
 
     slot: int
@@ -71,7 +71,7 @@ class CommonVariable:
     unit: str = ""
     description: str = ""
     line: int = 0
-    point: Point | None = None
+    point: IoPoint | None = None
     bank: int | None = None
     scale: Scale | None = None
 

@@ -54,7 +54,7 @@ def watched(
 
 
 @dataclass(frozen=True)
-class Tuning:
+class TunableSetting:
     """A value for a tunable of a task, named with its type character."""
 
     task: str
@@ -67,7 +67,7 @@ def tunables_of(program: Program) -> dict[str, Symbol]:
     return {full: symbol for full, symbol in program.symbols.items() if symbol.tuning is not None}
 
 
-def tuning(programs: Mapping[str, Program], text: str) -> Tuning:
+def tuning(programs: Mapping[str, Program], text: str) -> TunableSetting:
     """Return the tunable and value of ``TASK.NAME=VALUE``; the type character may be left out.
 
     Raises:
@@ -80,4 +80,4 @@ def tuning(programs: Mapping[str, Program], text: str) -> Tuning:
     bare = {bare_name(full): full for full in tunables}
     full = name if name in tunables else bare.get(name, name)
     meant, found = named_setting(f"{full}={value}", tunables, f"task {task} has no tunable")
-    return Tuning(task, meant.label, found)
+    return TunableSetting(task, meant.label, found)

@@ -18,8 +18,8 @@ from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType
 from automax_ros.language.text.lexer import LineReader, LogicalLine
 from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
-from automax_ros.language.text.tokens import Kind, Token
-from automax_ros.rackfile.model.config import MAX_SLOT, Point
+from automax_ros.language.text.tokens import Token, TokenKind
+from automax_ros.rackfile.model.config import MAX_SLOT, IoPoint
 from automax_ros.rackfile.model.module import MAX_PRIORITY, MIN_PRIORITY
 from automax_ros.rackfile.reading.names import (
     DeclarationFault,
@@ -52,7 +52,7 @@ class DefinedCommon:
     declared: VariableName
     keyword: str
     line: int
-    point: Point | None = None
+    point: IoPoint | None = None
     non_volatile: bool = False
     drop: int | None = None
 
@@ -111,18 +111,18 @@ class _Tokens:
 
     @property
     def at_end(self) -> bool:
-        return self.next.kind in (Kind.END, Kind.REMARK)
+        return self.next.kind in (TokenKind.END, TokenKind.REMARK)
 
     def take(self) -> Token:
         token = self.next
         if token.fault is not None:
             raise _Fault(token.fault.code, token.fault.message, token.span, token.fault.hint)
-        if token.kind is not Kind.END:
+        if token.kind is not TokenKind.END:
             self._place += 1
         return token
 
     def take_mark(self, *marks: str) -> bool:
-        found = self.next.text in marks and self.next.kind in (Kind.MARK, Kind.OPERATOR)
+        found = self.next.text in marks and self.next.kind in (TokenKind.MARK, TokenKind.OPERATOR)
         self._place += found
         return found
 
@@ -180,7 +180,7 @@ class _Reader:
         keys = self._keys(tokens, ("SLOT", "REGISTER", "BIT"))
         self._add(declared, span, word, point=self._point(declared, span, word, keys, MAX_REGISTER))
 
-    def _point(self, declared: VariableName, span: Span, word: Token, keys: dict[str, _Given], highest: int) -> Point:
+    def _point(self, declared: VariableName, span: Span, word: Token, keys: dict[str, _Given], highest: int) -> IoPoint:
         if declared.dimensions or declared.type in (DataType.REAL, DataType.STRING):
             kind = "an array" if declared.dimensions else declared.type.word
             message = f"{declared.name} cannot be an I/O point: it is {kind}"
@@ -191,7 +191,7 @@ class _Reader:
         for key in ("SLOT", "REGISTER", "BIT") if is_bit else ("SLOT", "REGISTER"):
             if key not in keys:
                 raise _Fault("AMX6782", f"{word.text} {declared.name} lacks {key}", span)
-        return Point(
+        return IoPoint(
             _number(keys["SLOT"], 0, MAX_SLOT),
             _number(keys["REGISTER"], 0, highest),
             _number(keys["BIT"], 0, _MAX_BIT) if is_bit else None,
@@ -290,7 +290,7 @@ class _Reader:
         declared: VariableName,
         span: Span,
         word: Token,
-        point: Point | None = None,
+        point: IoPoint | None = None,
         non_volatile: bool = False,
         drop: int | None = None,
     ) -> None:
@@ -310,7 +310,7 @@ class _Reader:
 
 def _number(given: _Given, low: int, high: int) -> int:
     value = given.value
-    if value is None or value.kind is not Kind.INTEGER or not isinstance(value.value, int):
+    if value is None or value.kind is not TokenKind.INTEGER or not isinstance(value.value, int):
         hint = f"write {given.key.text}= and a number from {low} to {high}"
         raise _Fault("AMX6783", f"{given.key.text} must be a whole number", (value or given.key).span, hint)
     if not low <= value.value <= high:

@@ -17,7 +17,7 @@ from automax_ros.core.types import MAX_STRING_LENGTH
 from automax_ros.language.text.constants import STRING_LIMIT
 from automax_ros.language.text.lexer import END_OF_FILE, LineReader
 from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
-from automax_ros.language.text.tokens import Kind, Token
+from automax_ros.language.text.tokens import Token, TokenKind
 
 Check = Callable[[str], Iterable[Diagnostic]]
 """Returns the diagnostics of a task's text."""
@@ -147,9 +147,9 @@ def _ranges(text: str) -> tuple[dict[int, list[range]], dict[int, list[range]]]:
     for tokens, last_row in _logical_lines(text):
         for token in tokens:
             row = token.line - 1
-            if token.kind is Kind.STRING or (token.fault is not None and token.fault.code == "AMX0020"):
+            if token.kind is TokenKind.STRING or (token.fault is not None and token.fault.code == "AMX0020"):
                 quoted.setdefault(row, []).append(range(token.column - 1, token.end_column - 1))
-            elif token.kind is Kind.REMARK:
+            elif token.kind is TokenKind.REMARK:
                 first = token.column - 1 + len(token.text)
                 remarks.setdefault(row, []).append(range(first, len(rows[row])))
                 for after in range(row + 1, last_row + 1):

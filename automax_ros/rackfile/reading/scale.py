@@ -16,7 +16,7 @@ from automax_ros.core.diagnostics import Span
 from automax_ros.core.json_schema import Keys, Schema, listed, section
 from automax_ros.core.numbers import REAL_LIMIT, round_count
 from automax_ros.core.types import DataType
-from automax_ros.core.yaml_text import Node, Sequence
+from automax_ros.core.yaml_text import Node, YamlSequence
 from automax_ros.rackfile.reading.values import (
     ProblemList,
     Section,
@@ -83,7 +83,7 @@ def _pair(section: Section, key: str, read: Callable[[Node, str, ProblemList], _
     """Return two numbers that differ enough for a line through them, None if a problem was reported."""
     node, what = section.get(key), f"{key} of the {section.owner}"
     assert node is not None
-    if not isinstance(node, Sequence) or len(node.items) != 2:
+    if not isinstance(node, YamlSequence) or len(node.items) != 2:
         wrong_kind(node, what, "a list of two numbers", section.findings)
         return None
     first, last = [read(item, what, section.findings) for item in node.items]

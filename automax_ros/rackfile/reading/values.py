@@ -6,8 +6,7 @@ A ``Key`` is declared once: its JSON schema and the reading of its value, with l
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable
-from collections.abc import Mapping as AbstractMapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeGuard, TypeVar
 
@@ -17,7 +16,7 @@ from automax_ros.core.problems import PROBLEMS, Severity
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.values import is_number, number, value_of, whole_number
-from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence
+from automax_ros.core.yaml_text import Flaw, Node, Scalar, YamlMapping, YamlSequence
 
 MAX_FINDINGS = 200
 """Most errors, and most warnings, that one file reports (decision: more are not read; hostile files have millions)."""
@@ -77,9 +76,9 @@ class ProblemList:
 
 def kind_of(node: Node) -> str:
     """Return the kind of a node in words, for messages that expected another."""
-    if isinstance(node, Mapping):
+    if isinstance(node, YamlMapping):
         return "keys and values"
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         return "a list"
     if node.is_null:
         return "nothing"
@@ -173,7 +172,7 @@ def number_hint(node: Node) -> str | None:
 
 def entries_of(node: Node, what: str, findings: ProblemList) -> tuple[Entry, ...] | None:
     """Return keys and values, () for a key without a value; None (reported) for anything else."""
-    if isinstance(node, Mapping):
+    if isinstance(node, YamlMapping):
         return node.entries
     if isinstance(node, Scalar) and node.is_null:
         return ()
@@ -221,7 +220,7 @@ def text_key(name: str, schema: json_schema.Schema, limit: int = 100) -> Key[str
 def choice_key(
     name: str,
     text: str,
-    known: AbstractMapping[str, _T],
+    known: Mapping[str, _T],
     wrong: tuple[str, str],
     hint: Callable[[str], str | None] | None = None,
     default: str | None = None,
@@ -260,7 +259,7 @@ class Section:
         what: str,
         known: Collection[str],
         findings: ProblemList,
-        hints: AbstractMapping[str, str] | None = None,
+        hints: Mapping[str, str] | None = None,
         owner: str | None = None,
     ) -> None:
         """Sort the entries; ``what`` names the section in messages, ``known`` are its keys.

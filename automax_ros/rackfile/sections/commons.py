@@ -27,7 +27,7 @@ from automax_ros.core.names import PREDEFINED
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType, Value, bare_name
 from automax_ros.core.values import value_of, wanted
-from automax_ros.core.yaml_text import Node, Scalar, Sequence
+from automax_ros.core.yaml_text import Node, Scalar, YamlSequence
 from automax_ros.rackfile.model.config import DEFAULT_OUT_LIMIT, CommonVariable
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.reading.names import COMMON_NAME, DeclarationFault, VariableName, is_reserved, variable_name
@@ -103,7 +103,7 @@ _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 
 def _preset(node: Node | None, variable: CommonVariable, findings: ProblemList) -> Value | tuple[Value, ...] | None:
     what = f"preset of {variable.name}"
-    if not isinstance(node, Sequence):
+    if not isinstance(node, YamlSequence):
         return None if node is None else _read_one(node, variable, what, findings)
     if not variable.is_array:
         findings.add(_CODE, f"{what} is a list, but the variable is not an array", node.span)

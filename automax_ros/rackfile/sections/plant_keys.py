@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.core.json_schema import Schema, listed, may_be_empty, section
-from automax_ros.core.yaml_text import Node, Sequence
+from automax_ros.core.yaml_text import Node, YamlSequence
 from automax_ros.drive.circuit.ac_line import HIGHEST_HZ, LOWEST_HZ
 from automax_ros.rackfile.model.plants import LoadConfig, SupplyConfig
 from automax_ros.rackfile.reading.values import (
@@ -61,7 +61,7 @@ LOAD_HINTS = dict.fromkeys(
 
 
 def _table(node: Node, what: str, findings: ProblemList) -> tuple[tuple[float, float], ...] | None:
-    if not isinstance(node, Sequence) or not 2 <= len(node.items) <= MOST_PAIRS:
+    if not isinstance(node, YamlSequence) or not 2 <= len(node.items) <= MOST_PAIRS:
         wrong_kind(node, what, f"a list of 2 to {MOST_PAIRS} pairs, such as [[0, 0], [1750, 300]]", findings)
         return None
     pairs = [_pair(item, what, findings) for item in node.items]
@@ -74,7 +74,7 @@ def _table(node: Node, what: str, findings: ProblemList) -> tuple[tuple[float, f
 
 
 def _pair(node: Node, what: str, findings: ProblemList) -> tuple[float, float] | None:
-    if not isinstance(node, Sequence) or len(node.items) != 2:
+    if not isinstance(node, YamlSequence) or len(node.items) != 2:
         wrong_kind(node, f"a pair of {what}", "a list of two numbers: rpm and N m", findings)
         return None
     rpm = _SPEED.read(node.items[0], f"rpm of {what}", findings)

@@ -12,7 +12,7 @@ from typing import Any
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.json_schema import Keys, Schema, either, entries, may_be_empty, section, words
 from automax_ros.core.text import did_you_mean, quoted
-from automax_ros.core.yaml_text import Mapping, Node, Scalar
+from automax_ros.core.yaml_text import Node, Scalar, YamlMapping
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.base.nameplate import NamePlate
 from automax_ros.rackfile.model.plants import (
@@ -188,7 +188,7 @@ def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
 
 
 def _motor(node: Node, what: str, findings: ProblemList) -> str | NamePlate | None:
-    if isinstance(node, Mapping):
+    if isinstance(node, YamlMapping):
         return _plate(node, what, findings)
     name = text_value(node, what, findings, limit=_LIMIT)
     if name is not None and name not in MOTORS:
@@ -201,7 +201,7 @@ def _motor(node: Node, what: str, findings: ProblemList) -> str | NamePlate | No
     return name
 
 
-def _plate(node: Mapping, what: str, findings: ProblemList) -> NamePlate | None:
+def _plate(node: YamlMapping, what: str, findings: ProblemList) -> NamePlate | None:
     section = Section(node.entries, what, schemas(*_PLATE), findings)
     if not section.require(_PLATE_REQUIRED, what, node.span, findings):
         return None

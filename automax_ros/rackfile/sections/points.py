@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.json_schema import Keys, whole
 from automax_ros.core.types import DataType
-from automax_ros.rackfile.model.config import MAX_SLOT, Point
+from automax_ros.rackfile.model.config import MAX_SLOT, IoPoint
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.reading.names import VariableName
 from automax_ros.rackfile.reading.values import ProblemList, Section, integer_value, schemas, whole_key
@@ -38,7 +38,7 @@ class PointReader:
         self._findings = findings
         self._named: dict[tuple[int, int, int], tuple[str, Span]] = {}
 
-    def read(self, section: Section, declared: VariableName, span: Span) -> Point | None:
+    def read(self, section: Section, declared: VariableName, span: Span) -> IoPoint | None:
         """Return a variable's place on a module, None if it is in common memory or its place is wrong."""
         given = [key for key in KEYS if key in section]
         if not given:
@@ -66,7 +66,7 @@ class PointReader:
         register = first + number
         if not self._suits(declared, module, range(register, register + words), section):
             return None
-        point = Point(slot, register, bit)
+        point = IoPoint(slot, register, bit)
         return point if self._is_free(point, declared, span) else None
 
     def _first_register(self, section: Section, module: ModuleConfig, what: str, span: Span) -> int | None:
@@ -90,7 +90,7 @@ class PointReader:
             return None
         return None if drop is None else drop * registers.area
 
-    def check_input(self, point: Point, declared: VariableName, span: Span) -> None:
+    def check_input(self, point: IoPoint, declared: VariableName, span: Span) -> None:
         """Report a point for the process to write, if only its module or tasks may write it."""
         module = self._modules[point.slot]
         place = module.registers.place(point.register)
@@ -153,7 +153,7 @@ class PointReader:
         self._findings.add("AMX6420", f"{what} is in slot {slot}, but {held}", node.span, "name the I/O module's slot")
         return None
 
-    def _is_free(self, point: Point, declared: VariableName, span: Span) -> bool:
+    def _is_free(self, point: IoPoint, declared: VariableName, span: Span) -> bool:
         """Report a register or bit that has a name already; only a word may have bits that are named too."""
         size = _SIZES[declared.type]
         first = 16 * point.register + (point.bit or 0)

@@ -8,7 +8,7 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.json_schema import SCALAR, Schema, listed
 from automax_ros.core.names import NameFault, element
 from automax_ros.core.yaml_text import Node
-from automax_ros.core.yaml_text import Sequence as YamlList
+from automax_ros.core.yaml_text import YamlSequence as YamlList
 from automax_ros.rackfile.model.config import CommonElement, CommonVariable
 from automax_ros.rackfile.reading.values import ProblemList, text_value, wrong_kind
 

@@ -47,7 +47,7 @@ REPAIR_HINT = "`automax bag repair` makes a whole recording of what is readable"
 
 
 @dataclass
-class TaskInfo:
+class RecordedTask:
     """The scans of a task: their count, lowest and highest number, missing numbers, restarts, logged errors.
 
     ``errors`` counts them by BASIC line and number of the problem.
@@ -107,7 +107,7 @@ class BagInfo(Tally):
     path: Path
     custom_data: dict[str, str] = field(default_factory=dict)
     table: VariableTable | None = None
-    tasks: dict[str, TaskInfo] = field(default_factory=dict)
+    tasks: dict[str, RecordedTask] = field(default_factory=dict)
     files: list[FileInfo] = field(default_factory=list)
     operations: list[Operation] = field(default_factory=list)
     attachments: list[AttachmentInfo] = field(default_factory=list)
@@ -229,7 +229,7 @@ def _count_scan(info: BagInfo, record: RawMessage) -> None:
     if task is None:
         if len(info.tasks) >= MOST_KEPT:
             raise BagError("AMX6814", info.path, f"scans of more than {MOST_KEPT} tasks")
-        task = info.tasks[head.task] = TaskInfo()
+        task = info.tasks[head.task] = RecordedTask()
     task.count(head.scan)
     if record.data[-len(_NO_ERRORS) :] != _NO_ERRORS:
         for logged in _decode(info, _SCAN, record).errors:

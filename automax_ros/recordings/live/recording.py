@@ -33,7 +33,7 @@ from automax_ros.recordings.mcap.errors import RecordingError
 from automax_ros.recordings.read.common_log import WriteLog
 from automax_ros.recordings.write.data_file import StorageOptions
 from automax_ros.recordings.write.recording import Recording
-from automax_ros.recordings.write.writer import MAX_STAMP, BagWriter, Channel
+from automax_ros.recordings.write.writer import MAX_STAMP, BagWriter, RecordedChannel
 
 SETTLE_NS = NS_PER_S
 """If no write is received for this long, none is missing."""
@@ -111,7 +111,7 @@ class LiveRecording(Recording):
             **dict.fromkeys(topics.values, self._record_value),
             **dict.fromkeys(topics.plants, self._record_plant),
         }
-        self._channels: dict[str, Channel] = {
+        self._channels: dict[str, RecordedChannel] = {
             name: self._writer.channel(name, kind.type_name, kind.qos) for name, kind in topics.all.items()
         }
 

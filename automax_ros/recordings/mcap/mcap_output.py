@@ -145,7 +145,7 @@ _COMPRESSORS: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-class Output(Protocol):
+class ByteSink(Protocol):
     """Receives the bytes of a file."""
 
     def write(self, data: bytes) -> int:
@@ -164,7 +164,7 @@ class McapOutput:
     chunk or by ``add_definition``.
     """
 
-    def __init__(self, output: Output, *, library: str, compression: str) -> None:
+    def __init__(self, output: ByteSink, *, library: str, compression: str) -> None:
         """Write the header. ``compression`` is ``zstd``, ``lz4`` or empty."""
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}

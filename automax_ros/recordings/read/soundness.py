@@ -21,7 +21,7 @@ from automax_ros.recordings.read.run_facts import run_facts
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Soundness:
     """The result of checking a whole recording.
 
     ``fault`` is why it is not sound, None if it is; ``gaps`` lists writes that are missing nevertheless.
@@ -31,7 +31,7 @@ class Verdict:
     gaps: tuple[str, ...] = ()
 
 
-def verdict_of(reader: BagReader) -> Verdict:
+def verdict_of(reader: BagReader) -> Soundness:
     """Read all messages of the known types, and return the verdict."""
     log: CommonLog | None = None
     fault: BagError | None = None
@@ -55,7 +55,7 @@ def verdict_of(reader: BagReader) -> Verdict:
             scans.require(reader.path)
     except BagError as error:
         fault = error
-    return Verdict(fault, tuple(log.missing_writes) if log else ())
+    return Soundness(fault, tuple(log.missing_writes) if log else ())
 
 
 class _StrictLog(CommonLog):

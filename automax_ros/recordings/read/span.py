@@ -17,7 +17,7 @@ _SCAN = "automax_msgs/msg/Scan"
 
 
 @dataclass
-class Span:
+class RunSpan:
     """Start of the run, first and last stamp; nanoseconds.
 
     ``scans`` counts those of the requested tasks in the requested range.
@@ -41,7 +41,7 @@ def span_of(
     from_ns: int = 0,
     to_ns: int | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Span:
+) -> RunSpan:
     """Return the span of a recording, with the number of scans of tasks in a range of ns since the start of the run.
 
     Raises:
@@ -49,16 +49,16 @@ def span_of(
     """
     reader = BagReader(bag)
     reader.on_progress = progress
-    found: Span | None = None
+    found: RunSpan | None = None
     for record in reader.records():
         stamp = record.publish_time
         if found is None:
-            found = Span(run_start, stamp, stamp)
+            found = RunSpan(run_start, stamp, stamp)
         found.first, found.last = min(found.first, stamp), max(found.last, stamp)
         if tasks and record.schema is not None and record.schema.name == _SCAN:
             time = stamp - run_start
             found.scans += from_ns <= time and (to_ns is None or time <= to_ns) and _task(record) in tasks
-    return found or Span(run_start, run_start, run_start)
+    return found or RunSpan(run_start, run_start, run_start)
 
 
 def require_scans(bag: Path, run_start: int, tasks: Collection[str], from_ns: int, to_ns: int | None) -> None:

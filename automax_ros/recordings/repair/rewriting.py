@@ -24,7 +24,7 @@ _LOOSE_BYTES = 1 << 20
 _OWN = "automax_msgs/msg/"
 
 
-class Found(NamedTuple):
+class FoundScan(NamedTuple):
     """A message of a damaged file; times in nanoseconds."""
 
     channel: int
@@ -124,7 +124,7 @@ class RepairWriter:
     def _put_chunk(self, piece: WholeChunk, *, last: bool) -> None:
         """Write a chunk: unchanged if all of it is sound, else only its sound messages."""
         data = bytes(piece.data)
-        found: list[Found] = []
+        found: list[FoundScan] = []
         index: dict[int, list[int]] = {}
         inner: set[tuple[type, int]] = set()
         end, whole = 0, piece.packed is not None
@@ -153,19 +153,19 @@ class RepairWriter:
             self._output.add_packed_chunk(piece.packed, ChunkBuilder(index))
             self._count(found)
 
-    def _choose(self, messages: Sequence[Found]) -> list[Found]:
+    def _choose(self, messages: Sequence[FoundScan]) -> list[FoundScan]:
         """Return the messages that can be decoded and follow each other; count the others as dropped."""
         places = [self._is_usable(message) for message in messages]
         self._drop([message for message, usable in zip(messages, places, strict=True) if not usable])
         return [message for message, usable in zip(messages, places, strict=True) if usable]
 
-    def _add(self, messages: Sequence[Found]) -> None:
+    def _add(self, messages: Sequence[FoundScan]) -> None:
         self._define({message.channel for message in messages})
         for message in messages:
             self._loose.add_message(message.channel, message.sequence, message.log_time, message.stamp, message.payload)
         self._count(messages)
 
-    def _is_usable(self, message: Found) -> bool:
+    def _is_usable(self, message: FoundScan) -> bool:
         """Whether the channel of a message is defined, and its schema if it has one, and the message is in order."""
         contents, channel, payload = self.contents, message.channel, message.payload
         known = contents.channels.get(channel)
@@ -187,11 +187,11 @@ class RepairWriter:
                     self._defined.add((type(record), record.id))
         self._defined |= inner
 
-    def _count(self, messages: Sequence[Found]) -> None:
+    def _count(self, messages: Sequence[FoundScan]) -> None:
         for message in messages:
             self.contents.count(message.channel, message.log_time, message.stamp, message.payload)
 
-    def _drop(self, messages: Sequence[Found]) -> None:
+    def _drop(self, messages: Sequence[FoundScan]) -> None:
         self.dropped_messages += len(messages)
         self.dropped_scans += sum(self.contents.type_of(message.channel) == SCAN for message in messages)
 
@@ -200,7 +200,7 @@ class RepairWriter:
         self._loose = ChunkBuilder()
 
 
-def kept(messages: Sequence[Found], type_of: Callable[[int], str], *, cut: bool) -> int:
+def kept(messages: Sequence[FoundScan], type_of: Callable[[int], str], *, cut: bool) -> int:
     """Return how many of a file's last messages to keep, so that they end with a whole instant.
 
     If a chunk was ``cut``, the last instant may be incomplete and is dropped. If the last scan is not followed by its
@@ -218,7 +218,7 @@ def kept(messages: Sequence[Found], type_of: Callable[[int], str], *, cut: bool)
     return count
 
 
-def _lacks_writes(messages: Sequence[Found], type_of: Callable[[int], str]) -> bool:
+def _lacks_writes(messages: Sequence[FoundScan], type_of: Callable[[int], str]) -> bool:
     """Whether the last scan of a file is followed only by writes, and these are fewer than it made."""
     try:
         scan: Any = decode(SCAN, messages[0].payload)
@@ -234,6 +234,6 @@ def _lacks_writes(messages: Sequence[Found], type_of: Callable[[int], str]) -> b
     return missing > 0
 
 
-def _make_found(content: bytes) -> Found:
+def _make_found(content: bytes) -> FoundScan:
     channel, sequence, log_time, stamp = MESSAGE_FIELDS.unpack_from(content)
-    return Found(channel, sequence, log_time, stamp, content[MESSAGE_FIELDS.size :])
+    return FoundScan(channel, sequence, log_time, stamp, content[MESSAGE_FIELDS.size :])

@@ -30,7 +30,7 @@ MAX_ERRORS = 1000
 Floats = npt.NDArray[np.float64]
 
 
-class Role(enum.IntEnum):
+class TraceRole(enum.IntEnum):
     """The role of a line in its lane: reference, lagged reference, feedback, the plant's value, or another."""
 
     REFERENCE = 0
@@ -47,7 +47,7 @@ class Line:
     variable: Watched
     times: Floats
     values: Floats
-    role: Role = Role.OTHER
+    role: TraceRole = TraceRole.OTHER
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ def _always() -> bool:
     return True
 
 
-class Channel:
+class RecordedChannel:
     """One topic of a recording, created by :meth:`BagWriter.channel`. ``message_count`` counts over all files."""
 
     __slots__ = ("message_count", "number", "qos", "topic", "type_name")
@@ -93,7 +93,7 @@ class BagWriter:
         self._keeps_pace = keeps_pace
         self.custom_data = dict(custom_data or {})
         self._options = options or StorageOptions()
-        self._channels: dict[str, Channel] = {}
+        self._channels: dict[str, RecordedChannel] = {}
         self._definitions: list[Schema | ChannelRecord] = []
         self._schemas: dict[str, int] = {}
         self._attachments: list[Attachment] = []
@@ -127,7 +127,7 @@ class BagWriter:
     ) -> None:
         self.close()
 
-    def channel(self, topic: str, type_name: str, qos: QosProfile) -> Channel:
+    def channel(self, topic: str, type_name: str, qos: QosProfile) -> RecordedChannel:
         """Return the channel of a topic; the first call for a topic creates it.
 
         Raises:
@@ -150,10 +150,10 @@ class BagWriter:
         metadata = {"offered_qos_profiles": qos_text(qos), "topic_type_hash": kind.hash}
         number = len(self._channels) + 1
         self._define(ChannelRecord(id=number, topic=topic, message_encoding="cdr", metadata=metadata, schema_id=schema))
-        channel = self._channels[topic] = Channel(number, topic, type_name, qos)
+        channel = self._channels[topic] = RecordedChannel(number, topic, type_name, qos)
         return channel
 
-    def write(self, channel: Channel, stamp: int, payload: bytes) -> None:
+    def write(self, channel: RecordedChannel, stamp: int, payload: bytes) -> None:
         """Add a message (CDR bytes) at a time in nanoseconds; messages of one time belong to one instant.
 
         Its log time is the stamp, or one nanosecond after the previous message if that is later: log times increase.
@@ -304,7 +304,7 @@ class BagWriter:
             self._mcap.channels[record.id] = record
         self._chunk.add_record(record)
 
-    def _begin_instant(self, channel: Channel, stamp: int, payload: bytes) -> None:
+    def _begin_instant(self, channel: RecordedChannel, stamp: int, payload: bytes) -> None:
         """Begin an instant with a message at a new time; end the chunk first if its time has passed or it is full."""
         if not self._open or not 0 <= stamp <= MAX_STAMP:
             raise self._bad_message(channel, stamp, payload)
@@ -318,7 +318,7 @@ class BagWriter:
             self._chunk_end = (time // period + 1) * period
         self._stamp = stamp
 
-    def _relieved_chunk(self, channel: Channel, stamp: int, payload: bytes) -> ChunkBuilder:
+    def _relieved_chunk(self, channel: RecordedChannel, stamp: int, payload: bytes) -> ChunkBuilder:
         """Return an empty chunk for a long message; refuse one that is too long."""
         if len(payload) > MAX_PAYLOAD_BYTES:
             raise self._bad_message(channel, stamp, payload)
@@ -355,7 +355,7 @@ class BagWriter:
         ]
         return BagMetadata(files, topics, self.custom_data)
 
-    def _bad_message(self, channel: Channel, stamp: int, payload: bytes) -> RecordingError:
+    def _bad_message(self, channel: RecordedChannel, stamp: int, payload: bytes) -> RecordingError:
         if not self._open:
             return self._refusal(f"message on {channel.topic} after the recording was closed")
         if len(payload) > MAX_PAYLOAD_BYTES:

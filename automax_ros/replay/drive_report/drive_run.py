@@ -13,10 +13,10 @@ from automax_ros.drive.current_loop.faults import KINDS
 from automax_ros.drive.current_loop.regulator import FULL
 from automax_ros.messages.types.messages import PlantState
 from automax_ros.recordings.read.common_log import Watched
-from automax_ros.recordings.tables.traces import Course, Line, Role
-from automax_ros.replay.drive_report.drive_signals import SPEED_REF, ReportDrive, Signal
+from automax_ros.recordings.tables.traces import Course, Line, TraceRole
+from automax_ros.replay.drive_report.drive_signals import SPEED_REF, RecordedSignal, ReportDrive
 from automax_ros.replay.drive_report.drive_totals import CountTotals, PlantTotals, rpm_of
-from automax_ros.replay.drive_report.happenings import MOST_EVENTS, Event, Happenings
+from automax_ros.replay.drive_report.happenings import MOST_EVENTS, DriveEvent, Happenings
 
 FAULTS = tuple(kind.output.upper() for kind in KINDS)
 """The fault outputs of DC_DRIVE_CML (52.2.2)."""
@@ -71,7 +71,7 @@ class DriveRun:
     starts: int = 0
     changes: int = 0
     _values: dict[str, float] = field(default_factory=dict)
-    _courses: dict[tuple[str, str, DataType, Role], Course] = field(default_factory=dict)
+    _courses: dict[tuple[str, str, DataType, TraceRole], Course] = field(default_factory=dict)
     _begun: dict[str, float] = field(default_factory=dict)
     _time_s: float | None = None
     _broken: tuple[str, ...] = ()
@@ -118,7 +118,7 @@ class DriveRun:
         value, lim_bar = self._values.get(keyword), self.drive.lim_bar
         return None if value is None or lim_bar is None else value / FULL * lim_bar
 
-    def _note(self, time_s: float, signal: Signal, before: float | None, value: float) -> None:
+    def _note(self, time_s: float, signal: RecordedSignal, before: float | None, value: float) -> None:
         """Add the event of an edge."""
         keyword, on = signal.keyword, value != 0.0
         if keyword in FAULTS:
@@ -137,7 +137,7 @@ class DriveRun:
         elif keyword == "BRIDGE_POL":
             self.changes += self._values.get("DC_CML_STATE", 1.0) != 0.0
 
-    def _note_fault(self, time_s: float, signal: Signal, *, on: bool) -> None:
+    def _note_fault(self, time_s: float, signal: RecordedSignal, *, on: bool) -> None:
         keyword = signal.keyword
         what = signal.text.removeprefix("fault: ").partition(";")[0]
         if on and keyword not in self._begun:
@@ -150,7 +150,7 @@ class DriveRun:
                 self.faults.append(span)
             self.add_event(time_s, "fault", f"no fault any more: {what} ({keyword} {signal.variable})")
 
-    def _draw(self, time_s: float, signal: Signal) -> None:
+    def _draw(self, time_s: float, signal: RecordedSignal) -> None:
         keyword = signal.keyword
         label = f"{keyword} {signal.variable}"
         if keyword in DRAWN_STATES or keyword in FAULTS:
@@ -159,28 +159,28 @@ class DriveRun:
             unit, convert = _CONVERSIONS[keyword]
             found = convert(self)
             shown = (unit, found) if found is not None else ("counts", self._values[keyword])
-            self._append(label, shown[0], DataType.REAL, time_s, shown[1], _ROLES.get(keyword, Role.OTHER))
+            self._append(label, shown[0], DataType.REAL, time_s, shown[1], _ROLES.get(keyword, TraceRole.OTHER))
         elif keyword == SPEED_REF:
             self._draw_reference(label, time_s, signal)
         elif keyword.startswith("register "):
             self._append(label, signal.text or "counts", DataType.REAL, time_s, self._values[keyword])
 
     def _append(
-        self, label: str, unit: str, kind: DataType, time_s: float, value: float, role: Role = Role.OTHER
+        self, label: str, unit: str, kind: DataType, time_s: float, value: float, role: TraceRole = TraceRole.OTHER
     ) -> None:
         if isfinite(value):
             self._courses.setdefault((label, unit, kind, role), Course()).append(time_s, value)
 
-    def _draw_reference(self, label: str, time_s: float, signal: Signal) -> None:
+    def _draw_reference(self, label: str, time_s: float, signal: RecordedSignal) -> None:
         value = self._values[signal.keyword]
         if signal.scale is not None:
             value = signal.scale.value_of(int(value))
         if signal.is_rpm:
-            self._draw_speed(label, time_s, value, Role.REFERENCE)
+            self._draw_speed(label, time_s, value, TraceRole.REFERENCE)
         else:
-            self._append(label, PERCENT_SPEED, DataType.REAL, time_s, 100 * value / FULL, Role.REFERENCE)
+            self._append(label, PERCENT_SPEED, DataType.REAL, time_s, 100 * value / FULL, TraceRole.REFERENCE)
 
-    def _draw_speed(self, label: str, time_s: float, rpm: float, role: Role) -> None:
+    def _draw_speed(self, label: str, time_s: float, rpm: float, role: TraceRole) -> None:
         """Add a speed to the lane of SPEED_FDBK if the motor's base speed is known, else to one in rpm."""
         if self._base_rpm is None:
             self._append(label, "rpm", DataType.REAL, time_s, rpm, role)
@@ -199,13 +199,13 @@ class DriveRun:
             return
         self.plant.take(message)
         parameters = self.drive.parameters
-        self._draw_speed("speed of the plant", time_s, message.speed_rpm, Role.PLANT)
+        self._draw_speed("speed of the plant", time_s, message.speed_rpm, TraceRole.PLANT)
         label = "current of the plant"
         if parameters is None:
-            self._append(label, "A", DataType.REAL, time_s, message.current_a, Role.PLANT)
+            self._append(label, "A", DataType.REAL, time_s, message.current_a, TraceRole.PLANT)
         else:
             current = 100 * message.current_a / parameters.amps
-            self._append(label, PERCENT_CURRENT, DataType.REAL, time_s, current, Role.PLANT)
+            self._append(label, PERCENT_CURRENT, DataType.REAL, time_s, current, TraceRole.PLANT)
         if "BRIDGE_POL" not in self.drive.signals:
             for number in (1, 2):
                 conducts = float(message.bridge == number)
@@ -226,7 +226,7 @@ class DriveRun:
         self._broken = broken
 
     @property
-    def events(self) -> list[Event]:
+    def events(self) -> list[DriveEvent]:
         """The events, in the order of time after ``finish``."""
         return self.happened.events
 
@@ -289,8 +289,8 @@ _CONVERSIONS: dict[str, tuple[str, Callable[[DriveRun], float | None]]] = {
 }
 """Numbers that are drawn: unit and conversion; counts are drawn if the scale is unknown."""
 _ROLES = {
-    "REFERENCE": Role.REFERENCE,
-    "REF_LAG_OUT": Role.LAGGED,
-    "I_FDBK": Role.FEEDBACK,
-    "SPEED_FDBK": Role.FEEDBACK,
+    "REFERENCE": TraceRole.REFERENCE,
+    "REF_LAG_OUT": TraceRole.LAGGED,
+    "I_FDBK": TraceRole.FEEDBACK,
+    "SPEED_FDBK": TraceRole.FEEDBACK,
 }

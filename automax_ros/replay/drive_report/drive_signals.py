@@ -31,7 +31,7 @@ MOST_REGISTERS = 12
 
 
 @dataclass(frozen=True)
-class Signal:
+class RecordedSignal:
     """A common that carries a signal of a drive.
 
     Attributes:
@@ -69,7 +69,7 @@ class ReportDrive:
     name: str
     where: str
     task: str = ""
-    signals: Mapping[str, Signal] = field(default_factory=dict)
+    signals: Mapping[str, RecordedSignal] = field(default_factory=dict)
     unseen: tuple[str, ...] = ()
     parameters: DriveParameters | None = None
     lim_bar: float | None = None
@@ -100,9 +100,11 @@ def report_drives(
     return [_report_drive(drive, stored.config, programs, given.get(drive.name)) for drive in drives]
 
 
-def _given_references(stored: StoredRack, drives: Sequence[str], references: Mapping[str, str]) -> dict[str, Signal]:
+def _given_references(
+    stored: StoredRack, drives: Sequence[str], references: Mapping[str, str]
+) -> dict[str, RecordedSignal]:
     """Return the speed references that the user names, by drive."""
-    found: dict[str, Signal] = {}
+    found: dict[str, RecordedSignal] = {}
     for drive, name in references.items():
         owner = drives[0] if not drive and len(drives) == 1 else drive
         if owner not in drives:
@@ -117,20 +119,20 @@ def _given_references(stored: StoredRack, drives: Sequence[str], references: Map
             raise BagError("AMX6841", stored.bag, fault.message, fault.hint) from fault
         if meant.variable.type in (DataType.STRING, DataType.BOOLEAN):
             raise BagError("AMX6841", stored.bag, f"speed reference: {meant.label} is {meant.variable.type.word}")
-        found[owner] = Signal(SPEED_REF, meant.label, is_rpm=meant.variable.unit.strip().lower() == "rpm")
+        found[owner] = RecordedSignal(SPEED_REF, meant.label, is_rpm=meant.variable.unit.strip().lower() == "rpm")
     return found
 
 
-def _named_reference(drive: RackDrive, config: RackConfig) -> Signal | None:
+def _named_reference(drive: RackDrive, config: RackConfig) -> RecordedSignal | None:
     """Return the speed reference that the rack file names: the common of the velocity of its plant's joint."""
     for command in config.joint_commands:
         if drive.plant is not None and (command.plant, command.interface) == (drive.plant.name, "velocity"):
-            return Signal(SPEED_REF, command.common, scale=command.scale, is_rpm=True)
+            return RecordedSignal(SPEED_REF, command.common, scale=command.scale, is_rpm=True)
     return None
 
 
 def _report_drive(
-    drive: RackDrive, config: RackConfig, programs: Sequence[Program], reference: Signal | None
+    drive: RackDrive, config: RackConfig, programs: Sequence[Program], reference: RecordedSignal | None
 ) -> ReportDrive:
     try:
         data = drive.data
@@ -157,8 +159,8 @@ def _report_drive(
     )
 
 
-def _of_call(drive: RackDrive, config: RackConfig) -> tuple[dict[str, Signal], tuple[str, ...]]:
-    signals: dict[str, Signal] = {}
+def _of_call(drive: RackDrive, config: RackConfig) -> tuple[dict[str, RecordedSignal], tuple[str, ...]]:
+    signals: dict[str, RecordedSignal] = {}
     unseen: list[str] = []
     call = drive.call
     if call is None or drive.program is None:
@@ -173,7 +175,7 @@ def _of_call(drive: RackDrive, config: RackConfig) -> tuple[dict[str, Signal], t
         if label is None:
             unseen.append(keyword)
         else:
-            signals[keyword] = Signal(keyword, label, isinstance(given, Unary), text)
+            signals[keyword] = RecordedSignal(keyword, label, isinstance(given, Unary), text)
     return signals, tuple(unseen)
 
 
@@ -189,11 +191,11 @@ def _common(expression: Expression, program: Program, config: RackConfig) -> str
         return None
 
 
-def _of_registers(drive: RackDrive, config: RackConfig) -> dict[str, Signal]:
+def _of_registers(drive: RackDrive, config: RackConfig) -> dict[str, RecordedSignal]:
     """Return the command and feedback registers of a UDC's drive that have commons."""
     found = sorted(_registers(drive, config))[:MOST_REGISTERS]
     return {
-        (keyword := _KEYWORDS.get(register, f"register {register}")): Signal(
+        (keyword := _KEYWORDS.get(register, f"register {register}")): RecordedSignal(
             keyword, name, text=_WORDS.get(register, "")
         )
         for register, name in found

@@ -24,7 +24,7 @@ _WHO = {WriterKind.ROS: "ROS sets", WriterKind.OPERATOR: "set"}
 
 
 @dataclass(frozen=True)
-class Event:
+class DriveEvent:
     """An event, at s of the run. ``kind``: ``state``, ``fault``, ``error``, ``plant`` or ``operation``."""
 
     time_s: float
@@ -66,12 +66,12 @@ class ValuesSet:
             self._end(name)
             self._open[name] = _Written(time_ns, writer, value, time_ns, value)
 
-    def events(self) -> list[Event]:
+    def events(self) -> list[DriveEvent]:
         """Return all writes as events, in the order of time."""
         for name in list(self._open):
             self._end(name)
         ended = sorted(self._ended, key=lambda item: item[0])
-        return [Event(time_ns / NS_PER_S, "operation", cut(text)) for time_ns, text in ended]
+        return [DriveEvent(time_ns / NS_PER_S, "operation", cut(text)) for time_ns, text in ended]
 
     def _end(self, name: str) -> None:
         written = self._open.pop(name, None)
@@ -91,7 +91,7 @@ class ValuesSet:
 class Happenings:
     """Collects the events of a run, at most ``MOST_EVENTS`` of a kind; ``omitted`` counts the rest."""
 
-    events: list[Event] = field(default_factory=list)
+    events: list[DriveEvent] = field(default_factory=list)
     omitted: int = 0
     _counts: Counter[str] = field(default_factory=Counter)
 
@@ -99,7 +99,7 @@ class Happenings:
         """Add an event."""
         self._counts[kind] += 1
         if self._counts[kind] <= MOST_EVENTS:
-            self.events.append(Event(time_s, kind, cut(text)))
+            self.events.append(DriveEvent(time_s, kind, cut(text)))
         else:
             self.omitted += 1
 

@@ -13,11 +13,11 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.replay.scans.report import (
     Difference,
+    DifferenceKind,
     FirstScan,
     Greatest,
-    Kind,
     NamedValue,
-    Point,
+    ScanPoint,
     Settled,
 )
 
@@ -34,7 +34,7 @@ _MOST_COUNTED = 100_000
 class Found(NamedTuple):
     """An item that differs after one scan; ``counts`` is FALSE if the difference is within the tolerance."""
 
-    kind: Kind
+    kind: DifferenceKind
     key: Hashable
     recorded: Value
     replayed: Value
@@ -99,7 +99,7 @@ class _Run:
 class _Count:
     """The tally of one item that differs in at least one scan."""
 
-    def __init__(self, task: str, kind: Kind, label: Label, first: Point) -> None:
+    def __init__(self, task: str, kind: DifferenceKind, label: Label, first: ScanPoint) -> None:
         self.task, self.kind, self.label, self.first = task, kind, label, first
         self._scans = 0
         self._greatest: Greatest | None = None
@@ -108,7 +108,7 @@ class _Count:
     def differs(self, found: Found, scan: int, time_s: float) -> None:
         """Count a scan after which the item differs."""
         self._scans += found.counts
-        if self.kind is not Kind.VARIABLE:
+        if self.kind is not DifferenceKind.VARIABLE:
             return
         difference = _difference(found.recorded, found.replayed)
         if difference is None:
@@ -152,9 +152,9 @@ class DifferenceCounts:
     def __init__(self, origin: int, limit: int) -> None:
         self.origin = origin
         self._limit = limit
-        self._by_task: dict[str, dict[tuple[Kind, Hashable], _Count]] = {}
+        self._by_task: dict[str, dict[tuple[DifferenceKind, Hashable], _Count]] = {}
         self._count = 0
-        self._beyond: set[tuple[str, Kind, Hashable]] = set()
+        self._beyond: set[tuple[str, DifferenceKind, Hashable]] = set()
         self._first: tuple[str, int, float, Seen] | None = None
 
     def time_s(self, stamp: int) -> float:
@@ -171,7 +171,7 @@ class DifferenceCounts:
         scan: int,
         stamp: int,
         found: Sequence[Found],
-        label: Callable[[Kind, Hashable], Label],
+        label: Callable[[DifferenceKind, Hashable], Label],
         seen: Callable[[], Seen],
     ) -> bool:
         """Count one scan; return whether it differs. ``label`` is called for a new item, ``seen`` for the first."""
@@ -179,7 +179,7 @@ class DifferenceCounts:
         if not found and not tallies:
             return False
         time_s = self.time_s(stamp)
-        now: set[tuple[Kind, Hashable]] = set()
+        now: set[tuple[DifferenceKind, Hashable]] = set()
         for item in found:
             key = (item.kind, item.key)
             tally = tallies.get(key) or (self._new(task, item, scan, time_s, label) if item.counts else None)
@@ -200,7 +200,7 @@ class DifferenceCounts:
         scan: int,
         stamp: int,
         found: Sequence[Found],
-        label: Callable[[Kind, Hashable], Label],
+        label: Callable[[DifferenceKind, Hashable], Label],
         seen: Callable[[], Seen],
     ) -> None:
         """Count the fields in which one recorded state differs."""
@@ -233,7 +233,7 @@ class DifferenceCounts:
         return FirstScan(task, scan, time_s, tuple(differences), seen.latched, seen.read)
 
     def _new(
-        self, task: str, item: Found, scan: int, time_s: float, label: Callable[[Kind, Hashable], Label]
+        self, task: str, item: Found, scan: int, time_s: float, label: Callable[[DifferenceKind, Hashable], Label]
     ) -> _Count | None:
         """Create a tally; None beyond the limit."""
         if self._count >= self._limit:
@@ -241,7 +241,7 @@ class DifferenceCounts:
                 self._beyond.add((task, item.kind, item.key))
             return None
         self._count += 1
-        first = Point(scan, time_s, item.recorded, item.replayed)
+        first = ScanPoint(scan, time_s, item.recorded, item.replayed)
         tally = _Count(task, item.kind, label(item.kind, item.key), first)
         self._by_task[task][item.kind, item.key] = tally
         return tally

@@ -14,8 +14,8 @@ from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.recordings.read.common_log import Entry, Key
 from automax_ros.replay.scans.commons import RecordedCommons
 from automax_ros.replay.scans.compare import DifferenceCounts, Found, Label, Seen, within
-from automax_ros.replay.scans.inputs import CHANNELS, ScanMemory
-from automax_ros.replay.scans.report import Kind, NamedValue, errors_text
+from automax_ros.replay.scans.inputs import CHANNELS, ReplayMemory
+from automax_ros.replay.scans.report import DifferenceKind, NamedValue, errors_text
 from automax_ros.replay.scans.stored_rack import ReplaySource
 from automax_ros.runtime.scan.drive_record import COMMAND_VIEW, MEASURED_NAMES, MEASURED_VIEW
 from automax_ros.runtime.tasks.task import ScanRecord
@@ -31,7 +31,7 @@ class ScanComparison:
         self,
         source: ReplaySource,
         commons: RecordedCommons,
-        memory: ScanMemory,
+        memory: ReplayMemory,
         tallies: DifferenceCounts,
         tolerance: float,
     ) -> None:
@@ -47,7 +47,7 @@ class ScanComparison:
         """Compare a scan; return whether it differs."""
         self._record = record
         found = [
-            Found(Kind.VARIABLE, key, recorded, own, not within(recorded, own, self._tolerance))
+            Found(DifferenceKind.VARIABLE, key, recorded, own, not within(recorded, own, self._tolerance))
             for key, recorded, own in changes
         ]
         if not self._source.edited and not self._memory.writes_agree and not any(item.counts for item in found):
@@ -62,17 +62,21 @@ class ScanComparison:
         """Count the differences after a scan; return whether the scan differs."""
         return bool(self._tallies.scan(self._source.name, scan, stamp, found, self.label, self.seen))
 
-    def label(self, kind: Kind, key: Hashable) -> Label:
+    def label(self, kind: DifferenceKind, key: Hashable) -> Label:
         """Return the label of an item in the report."""
-        if kind is Kind.VARIABLE:
+        if kind is DifferenceKind.VARIABLE:
             variable = self._variable(cast(Key, key))
             lines = self._written_at.get(variable.name, ())
             return Label(element_name(variable, cast(Key, key)[1]), variable.unit, lines)
-        if kind is Kind.MESSAGE:
+        if kind is DifferenceKind.MESSAGE:
             return Label(f"message to channel #{key}")
-        if kind is Kind.COMMAND:
+        if kind is DifferenceKind.COMMAND:
             return Label(f"{key} commanded to the 57C406")
-        words = {Kind.WRITES: "order of writes", Kind.ERRORS: "run-time errors", Kind.STATUS: "running"}
+        words = {
+            DifferenceKind.WRITES: "order of writes",
+            DifferenceKind.ERRORS: "run-time errors",
+            DifferenceKind.STATUS: "running",
+        }
         return Label(words.get(kind) or f"state {key}")
 
     def seen(self) -> Seen:
@@ -101,7 +105,7 @@ class ScanComparison:
             other = writes[number] if number < len(writes) else None
             if one and other and one[:2] == other[:2] and self._is_same(one[2], other[2]):
                 continue
-            return [Found(Kind.WRITES, "writes", self._write_text(one), self._write_text(other))]
+            return [Found(DifferenceKind.WRITES, "writes", self._write_text(one), self._write_text(other))]
         return []
 
     def _other_messages(self) -> list[Found]:
@@ -112,18 +116,23 @@ class ScanComparison:
             counts = not self._alike(recorded, own)
             if counts or number not in first:
                 texts = _message_text(recorded), _message_text(own)
-                first.setdefault(number, Found(Kind.MESSAGE, number, *texts, counts))
+                first.setdefault(number, Found(DifferenceKind.MESSAGE, number, *texts, counts))
         found = list(first.values())
         for file in (self._source.recorded or self._source.compiled).program.files:
             unsent = channels.unsent(file.number) if file.direction is Direction.OUTPUT else ()
             if unsent and file.number not in first:
-                found.append(Found(Kind.MESSAGE, file.number, _message_text(unsent[1:] or unsent), "no message"))
+                found.append(
+                    Found(DifferenceKind.MESSAGE, file.number, _message_text(unsent[1:] or unsent), "no message")
+                )
         return found
 
     def _other_commands(self) -> list[Found]:
         """Return the differences in a loop's commands to its 57C406; with a tolerance they do not count (decision)."""
         counts = not self._tolerance
-        return [Found(Kind.COMMAND, name, recorded, own, counts) for name, recorded, own in self._memory.drive.other()]
+        return [
+            Found(DifferenceKind.COMMAND, name, recorded, own, counts)
+            for name, recorded, own in self._memory.drive.other()
+        ]
 
     def _alike(self, recorded: Sequence[Value], own: Sequence[Value]) -> bool:
         return len(recorded) == len(own) and all(map(self._is_same, recorded, own))
@@ -139,7 +148,7 @@ class ScanComparison:
             recorded, own = sorted((0, code) for _, code in recorded), sorted((0, code) for _, code in own)
         if recorded == own:
             return []
-        return [Found(Kind.ERRORS, "errors", errors_text(recorded), errors_text(own))]
+        return [Found(DifferenceKind.ERRORS, "errors", errors_text(recorded), errors_text(own))]
 
     def _write_text(self, entry: Entry | None) -> str:
         if entry is None:

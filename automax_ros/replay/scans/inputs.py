@@ -94,7 +94,7 @@ _APART = CHANNELS | DRIVES
 """The views of inputs that do not come from memory."""
 
 
-class ScanMemory:
+class ReplayMemory:
     """Common memory as one task's recorded scans saw it; the replayed task's own changes are kept separately.
 
     A scan reads its own writes, of this scan or of an earlier one unless there was another write since. As long as it

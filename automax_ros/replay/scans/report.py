@@ -21,7 +21,7 @@ _LONGEST_LIST = 40
 """Most inputs of one scan in the text."""
 
 
-class Kind(enum.Enum):
+class DifferenceKind(enum.Enum):
     """The kind of a difference."""
 
     VARIABLE = "variable"
@@ -34,7 +34,7 @@ class Kind(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Point:
+class ScanPoint:
     """One scan in which something differs: its number, its time since the start of the run, both values."""
 
     scan: int
@@ -74,9 +74,9 @@ class Difference:
     """
 
     task: str
-    kind: Kind
+    kind: DifferenceKind
     name: str
-    first: Point
+    first: ScanPoint
     scans: int
     unit: str = ""
     lines: tuple[int, ...] = ()

@@ -14,8 +14,8 @@ from automax_ros.replay.scans.carried_state import PartStart, Skipped
 from automax_ros.replay.scans.commons import RecordedCommons, UnknownValue
 from automax_ros.replay.scans.compare import DifferenceCounts, Found
 from automax_ros.replay.scans.comparison import ScanComparison
-from automax_ros.replay.scans.inputs import ScanMemory
-from automax_ros.replay.scans.report import Kind
+from automax_ros.replay.scans.inputs import ReplayMemory
+from automax_ros.replay.scans.report import DifferenceKind
 from automax_ros.replay.scans.state import fitting_state, held_in, log_is_empty, state_differences, whole_state
 from automax_ros.replay.scans.stored_rack import ReplaySource, unknown_value
 from automax_ros.replay.scans.totals import MOST_NOTES, TaskTotals
@@ -70,7 +70,7 @@ class TaskReplay:
         starts_at: int | None = None,
     ) -> None:
         self.name = source.name
-        self.memory = ScanMemory(commons, edited=source.edited)
+        self.memory = ReplayMemory(commons, edited=source.edited)
         self._bag, self._commons, self._tallies = bag, commons, tallies
         self._comparison = ScanComparison(source, commons, self.memory, tallies, tolerance)
         self._tolerance = tolerance
@@ -152,7 +152,7 @@ class TaskReplay:
             return
         recorded = "runs" if recorded_in is None else "ended by itself"
         replayed = "runs" if own_in is None else self._end_text()
-        found = [Found(Kind.STATUS, _STOPPED_KEY, recorded, replayed)]
+        found = [Found(DifferenceKind.STATUS, _STOPPED_KEY, recorded, replayed)]
         scan = (own_in if recorded_in is None else recorded_in) or self._last
         self._different += self._comparison.tally(scan, self._last_stamp, found)
         self._stopped_in = None
@@ -313,7 +313,8 @@ class TaskReplay:
     def _compare_state(self, state: TaskState) -> None:
         self._states += 1
         found = [
-            Found(Kind.STATE, name, one, other) for name, one, other in state_differences(self._bag, self._task, state)
+            Found(DifferenceKind.STATE, name, one, other)
+            for name, one, other in state_differences(self._bag, self._task, state)
         ]
         self._tallies.states(self.name, state.scan, state.stamp, found, self._comparison.label, self._comparison.seen)
         self._different += bool(found)
@@ -325,7 +326,7 @@ class TaskReplay:
         reason = self._end_text()
         self._note(f"stopped in scan {self._stopped_in}, {reason}; the scans after it are not compared")
         self._stopped_in = None
-        found = [Found(Kind.STATUS, _STOPPED_KEY, "runs", reason)]
+        found = [Found(DifferenceKind.STATUS, _STOPPED_KEY, "runs", reason)]
         self._different += self._comparison.tally(scan.scan, scan.stamp, found)
 
     def _end_text(self) -> str:

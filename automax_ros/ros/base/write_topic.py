@@ -21,7 +21,7 @@ from automax_ros.rackfile.reading.scale import Scale
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import message_class, ros_qos
 from automax_ros.ros.intake.guard import Throttle
-from automax_ros.ros.intake.rcl import RawMessage, SequenceTracker, TopicReader
+from automax_ros.ros.intake.rcl import SequenceTracker, TakenMessage, TopicReader
 from automax_ros.runtime.memory.views import MemoryValueError
 
 REFUSAL_INTERVAL_S = 1.0
@@ -88,7 +88,7 @@ class WriteTopic:
             self._reads_best_effort = True
             self._subscribe(BEST_EFFORT_COMMAND, None)
 
-    def receive(self, taken: RawMessage, *, reliable: bool) -> None:
+    def receive(self, taken: TakenMessage, *, reliable: bool) -> None:
         """Check a message that was taken, and pass it on or refuse it."""
         if taken.sender:
             missing = self._senders.missing(taken)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from rclpy.node import Node
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.ros.intake.rcl import RawMessage, library
+from automax_ros.ros.intake.rcl import TakenMessage, library
 
 PREFIX_BYTES = 12
 ALONE_NS = NS_PER_S
@@ -79,7 +79,7 @@ class RecordedRun:
         self._others: set[bytes] = set()
         self._last_ns = self._next_ns = 0
         self._has_rival = False
-        self._tables: dict[bytes, RawMessage] = {}
+        self._tables: dict[bytes, TakenMessage] = {}
         self._unknown: dict[bytes, UnknownPublisher] = {}
         self._reported: set[str] = set()
         self.news: list[str] = []
@@ -108,7 +108,7 @@ class RecordedRun:
             self.news.append(f"another rack is called {self._space} too: it is not recorded")
         return not self.knows_senders or self._main_participant in racks
 
-    def is_ours(self, topic: str, taken: RawMessage) -> bool:
+    def is_ours(self, topic: str, taken: TakenMessage) -> bool:
         """Return whether a message comes from the rack; those of other programs are counted for ``look``."""
         if not self.knows_senders:
             return True
@@ -137,14 +137,14 @@ class RecordedRun:
                         f"left out what another program publishes on {topic}: it is not of the recorded rack"
                     )
 
-    def keep(self, table: RawMessage) -> None:
+    def keep(self, table: TakenMessage) -> None:
         """Keep the table of another program: it may be that of the rack's next run."""
         self._tables[participant(table.sender)] = table
         if len(self._tables) > MOST_TABLES:
             racks = self.racks()
             self._tables = {sender: kept for sender, kept in self._tables.items() if sender in racks}
 
-    def successor(self) -> RawMessage | None:
+    def successor(self) -> TakenMessage | None:
         """Return the table of the rack's next run, once the present one has left the graph or is silent."""
         now = time.monotonic_ns()
         if not self._tables or now < self._next_ns:

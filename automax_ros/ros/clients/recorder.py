@@ -35,7 +35,7 @@ from automax_ros.recordings.write.data_file import StorageOptions
 from automax_ros.ros.base.qos import message_class
 from automax_ros.ros.clients.recorded_run import MOST_TABLES, RecordedRun, participant
 from automax_ros.ros.distributed.recorder_wait import recorder_name
-from automax_ros.ros.intake.rcl import RawMessage, reader_of
+from automax_ros.ros.intake.rcl import TakenMessage, reader_of
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.process import joined_context
 
@@ -79,7 +79,7 @@ class RawSubscription:
         self._subscription = node.create_subscription(self._class, topic, _nothing, qos, raw=True)
         self._reader = reader_of(self._subscription, MOST_BYTES)
 
-    def taken(self) -> Iterator[RawMessage]:
+    def taken(self) -> Iterator[TakenMessage]:
         """Yield the messages received; one longer than ``MOST_BYTES`` has no payload."""
         while (found := self._reader.take()) is not None:
             yield found
@@ -170,7 +170,7 @@ class LiveRecorder:
         """
         topic = self._topics.variables
         source = self._early.pop(topic, None) or RawSubscription(self._node, topic, self._topics.all[topic])
-        tables: dict[bytes, RawMessage] = {}
+        tables: dict[bytes, TakenMessage] = {}
         deadline = time.monotonic_ns() + wait_ns
         try:
             while not stopping() and time.monotonic_ns() < deadline:
@@ -188,7 +188,7 @@ class LiveRecorder:
             source.close()
         return None
 
-    def _bind(self, found: RawMessage) -> VariableTable:
+    def _bind(self, found: TakenMessage) -> VariableTable:
         self.binding.bind(found.sender)
         self._table = found.payload or b""
         table = table_of(self._table)
@@ -288,7 +288,7 @@ class LiveRecorder:
                     self._count_lost(topic, found.number)
                 self._order.add(found.sent_ns, (topic, found.payload or b""))
 
-    def _ours(self, subscription: RawSubscription) -> Iterator[RawMessage]:
+    def _ours(self, subscription: RawSubscription) -> Iterator[TakenMessage]:
         topic, binding = subscription.topic, self.binding
         for found in subscription.taken():
             if binding.is_ours(topic, found):

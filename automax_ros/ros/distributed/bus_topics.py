@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile
 from automax_ros.messages.cdr.cdr import CdrError, decode
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.base.qos import message_class
-from automax_ros.ros.intake.rcl import RawMessage, TopicReader
+from automax_ros.ros.intake.rcl import TakenMessage, TopicReader
 
 PARTICIPANT_BYTES = 12
 """Length of the part of a GID that all publishers of one process share."""
@@ -52,7 +52,7 @@ class BusTopic:
         self.name, self.take = reader.name, reader.take
         node.rack_context.intake.add(reader, share=terms.share)
 
-    def _take(self, taken: RawMessage) -> None:
+    def _take(self, taken: TakenMessage) -> None:
         if taken.payload is None:
             self._refuse(self._topic, f"a message of {taken.size:,} bytes")
             return

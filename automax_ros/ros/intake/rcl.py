@@ -159,7 +159,7 @@ MOST_MISSING = 1_000_000
 """A larger gap in a sender's numbers is not counted: any program can send any number."""
 
 
-class RawMessage(NamedTuple):
+class TakenMessage(NamedTuple):
     """A message: its bytes (None if it is longer than wanted), its size, when it was sent (ns, the sender's clock).
 
     ``number`` counts the sender's messages of the topic, 0 if unknown; ``sender`` is the publisher's GID, as in the
@@ -191,7 +191,7 @@ class _RclReader:
         self._buffer, self._info = rcl.buffer(), MessageInfo()
         self._into, self._about = ctypes.addressof(self._buffer), ctypes.addressof(self._info)
 
-    def take(self) -> RawMessage | None:
+    def take(self) -> TakenMessage | None:
         rcl, buffer, info = self._rcl, self._buffer, self._info
         with self._handle:
             result = rcl.take_serialized(self._handle.pointer, self._into, self._about, None)
@@ -205,7 +205,7 @@ class _RclReader:
         if size <= self._most_bytes:
             payload = ctypes.string_at(buffer.buffer, size) if buffer.buffer else b""
         rcl.give_back(buffer)
-        return RawMessage(payload, size, info.source_timestamp, info.publication_sequence_number, bytes(info.sender))
+        return TakenMessage(payload, size, info.source_timestamp, info.publication_sequence_number, bytes(info.sender))
 
 
 class _RclpyReader:
@@ -214,14 +214,14 @@ class _RclpyReader:
     def __init__(self, subscription: Any, most_bytes: int) -> None:
         self._handle, self._class, self._most_bytes = subscription.handle, subscription.msg_type, most_bytes
 
-    def take(self) -> RawMessage | None:
+    def take(self) -> TakenMessage | None:
         with self._handle:
             found = self._handle.take_message(self._class, True)
         if found is None:
             return None
         payload, info = found
         kept = payload if len(payload) <= self._most_bytes else None
-        return RawMessage(
+        return TakenMessage(
             kept, len(payload), info["source_timestamp"], info.get("publication_sequence_number") or 0, b""
         )
 
@@ -233,7 +233,7 @@ class TopicReader:
     quality of service keeps, until they are taken; those longer than wanted are never copied into Python bytes.
     """
 
-    def __init__(self, subscription: Any, most_bytes: int, receive: Callable[[RawMessage], None]) -> None:
+    def __init__(self, subscription: Any, most_bytes: int, receive: Callable[[TakenMessage], None]) -> None:
         self.name, self.handle = subscription.topic_name, subscription.handle
         self._reader, self._receive = reader_of(subscription, most_bytes), receive
 
@@ -257,7 +257,7 @@ class SequenceTracker:
     def __init__(self) -> None:
         self._last: dict[bytes, int] = {}
 
-    def missing(self, taken: RawMessage) -> int | None:
+    def missing(self, taken: TakenMessage) -> int | None:
         """Return how many messages of the sender are missing before this one; None if it has arrived already."""
         last = self._last.get(taken.sender)
         if last is None and len(self._last) >= MOST_SENDERS:

@@ -20,7 +20,7 @@ from typing import TypeAlias
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import quoted
 from automax_ros.core.user_error import UserError
-from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence, read_yaml
+from automax_ros.core.yaml_text import Flaw, Node, Scalar, YamlMapping, YamlSequence, read_yaml
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 
 ParameterValue: TypeAlias = "bool | int | float | str | list[bool] | list[int] | list[float] | list[str] | None"
@@ -113,7 +113,7 @@ def _tree(text: str, place: str) -> Node:
 
 
 def _nodes(node: Node, key: str, path: str) -> Iterator[GivenParameter]:
-    if not isinstance(node, Mapping):
+    if not isinstance(node, YamlMapping):
         raise _fault(f"{key or 'it'} must hold {_PARAMETERS}", node, path)
     for name, value in node.entries:
         if name.text == _PARAMETERS:
@@ -123,11 +123,11 @@ def _nodes(node: Node, key: str, path: str) -> Iterator[GivenParameter]:
 
 
 def _parameters(node: Node, key: str, prefix: str, path: str) -> Iterator[GivenParameter]:
-    if not isinstance(node, Mapping):
+    if not isinstance(node, YamlMapping):
         raise _fault(f"{_PARAMETERS} of {key} must be names and values", node, path)
     for name, value in node.entries:
         full = f"{prefix}{name.text}"
-        if isinstance(value, Mapping):
+        if isinstance(value, YamlMapping):
             yield from _parameters(value, key, f"{full}.", path)
         else:
             place = f"{path}:{name.span.line}"
@@ -137,7 +137,7 @@ def _parameters(node: Node, key: str, prefix: str, path: str) -> Iterator[GivenP
 def _value(node: Node, place: str) -> ParameterValue:
     if isinstance(node, Scalar):
         return _scalar(node)
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         found = [_scalar(item) if isinstance(item, Scalar) else None for item in node.items]
         for kind in (bool, int, float, str):
             if all(type(item) is kind for item in found):

@@ -28,7 +28,7 @@ It is logged, IOREAD% gives 0, IOWRITE writes nothing, and the task goes on (dec
 """
 
 
-class Part(NamedTuple):
+class RegisterPart(NamedTuple):
     """The effect of a write on one register: the bits of ``mask`` become those of ``bits``."""
 
     bank: int
@@ -70,15 +70,15 @@ class RegisterMap:
             if shown != read(other, 0):
                 yield other, 0, shown
 
-    def parts(self, view: int, element: int, value: Value) -> list[Part]:
+    def parts(self, view: int, element: int, value: Value) -> list[RegisterPart]:
         """Return the effect of a write to a point or a register on each register that it changes."""
         place = self._places.get(view)
         if place is None:
-            return [Part(view, element, _to_unsigned(value), WORD)]
+            return [RegisterPart(view, element, _to_unsigned(value), WORD)]
         if place.bit is not None:
-            return [Part(place.bank, place.register, int(bool(value)) << place.bit, 1 << place.bit)]
+            return [RegisterPart(place.bank, place.register, int(bool(value)) << place.bit, 1 << place.bit)]
         words = self._words(view, element, value, lambda *_: 0)
-        return [Part(place.bank, register, word, WORD) for register, word in words.items()]
+        return [RegisterPart(place.bank, register, word, WORD) for register, word in words.items()]
 
     def keeping(
         self,

@@ -7,13 +7,13 @@ from typing import Any, Protocol
 
 from automax_ros.runtime.scan.scan_record import ScanRecord, Steps
 
-__all__ = ["IDEAL", "Execution", "IdealExecution", "Job", "Place", "ScanRecord", "Steps"]
+__all__ = ["IDEAL", "Execution", "IdealExecution", "Place", "ScanJob", "ScanRecord", "Steps"]
 
 Place = Mapping[str, Any]
 """The progress of a job in numbers: ``left_ns`` before its next step, and what it ``skipped``."""
 
 
-class Job(Protocol):
+class ScanJob(Protocol):
     """A unit of work for a Processor: a scan of a task, or a burst of a BASIC task.
 
     ``priority`` is 4 (first) to 11; ``name``, the task's, is the order among equals.
@@ -39,22 +39,22 @@ class Job(Protocol):
 class Execution(Protocol):
     """Executes jobs: at once, as the methods of this class do, or as a Processor has time."""
 
-    def begin(self, job: Job, now_ns: int, skipped: int) -> None:
+    def begin(self, job: ScanJob, now_ns: int, skipped: int) -> None:
         """Begin to execute a job, which must not be in progress."""
         job.whole(now_ns, skipped)
 
-    def busy(self, job: Job) -> bool:  # noqa: ARG002
+    def busy(self, job: ScanJob) -> bool:  # noqa: ARG002
         """Return whether a job that was begun is not done yet."""
         return False
 
-    def drop(self, job: Job) -> None:
+    def drop(self, job: ScanJob) -> None:
         """Abandon a job, at whatever step; nothing is executed by this."""
 
-    def place(self, job: Job) -> Place | None:  # noqa: ARG002
+    def place(self, job: ScanJob) -> Place | None:  # noqa: ARG002
         """Return the progress of a job; None if it is not in progress."""
         return None
 
-    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:  # noqa: ARG002
+    def resume(self, job: ScanJob, place: Place, steps: Steps | None) -> None:  # noqa: ARG002
         """Continue a job from its place, with ``steps`` if it had begun; ValueError if jobs take no time."""
         raise ValueError(f"task {job.name} was in the middle of a scan: the state is that of modeled execution")
 
@@ -62,7 +62,7 @@ class Execution(Protocol):
 class IdealExecution(Execution):
     """A scan takes no time."""
 
-    def drop(self, job: Job) -> None:
+    def drop(self, job: ScanJob) -> None:
         """Do nothing: no job is in progress."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass
 
-from automax_ros.runtime.scan.execution import Job, Place, Steps
+from automax_ros.runtime.scan.execution import Place, ScanJob, Steps
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 
 
@@ -13,7 +13,7 @@ from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEv
 class _Frame:
     """A job in progress: ``remaining_ns`` of execution before its next step; ``steps`` is None before its first."""
 
-    job: Job
+    job: ScanJob
     skipped: int
     steps: Steps | None = None
     remaining_ns: int = 0
@@ -37,7 +37,7 @@ class ModeledExecution:
         self._since_ns = 0
         self._going = False
 
-    def begin(self, job: Job, now_ns: int, skipped: int) -> None:
+    def begin(self, job: ScanJob, now_ns: int, skipped: int) -> None:
         """Execute a job as soon as no other precedes it."""
         frame = _Frame(job, skipped)
         place = self._place_of(frame) if self._frames else 0
@@ -49,11 +49,11 @@ class ModeledExecution:
         if not self._going:
             self._go(now_ns)
 
-    def busy(self, job: Job) -> bool:
+    def busy(self, job: ScanJob) -> bool:
         """Return whether a job that was begun is not done yet."""
         return bool(self._frames) and self._frame(job) is not None
 
-    def drop(self, job: Job) -> None:
+    def drop(self, job: ScanJob) -> None:
         """Abandon a job; what it has written so far stays written. Nothing is executed by this."""
         frame = self._frame(job)
         if frame is None:
@@ -68,7 +68,7 @@ class ModeledExecution:
             with contextlib.suppress(ValueError):
                 frame.steps.close()
 
-    def place(self, job: Job) -> Place | None:
+    def place(self, job: ScanJob) -> Place | None:
         """Return the progress of a job; None if it is not in progress."""
         frame = self._frame(job)
         if frame is None:
@@ -76,7 +76,7 @@ class ModeledExecution:
         used_ns = self._scheduler.now_ns - self._since_ns if self._event is not None and frame is self._frames[0] else 0
         return {"left_ns": frame.remaining_ns - used_ns, "skipped": frame.skipped}
 
-    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
+    def resume(self, job: ScanJob, place: Place, steps: Steps | None) -> None:
         """Continue a job from its place; ``steps`` are at this place, None if it had not begun."""
         now_ns = self._scheduler.now_ns
         self._book(now_ns)
@@ -84,7 +84,7 @@ class ModeledExecution:
         self._frames.insert(self._place_of(frame), frame)
         self._wait(now_ns)
 
-    def _frame(self, job: Job) -> _Frame | None:
+    def _frame(self, job: ScanJob) -> _Frame | None:
         for frame in self._frames:
             if frame.job is job:
                 return frame

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping as AbstractMapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,7 +13,7 @@ from automax_ros.core.problems import Severity
 from automax_ros.core.text import did_you_mean, near_or_listed, quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_of, wanted
-from automax_ros.core.yaml_text import Mapping, Node, Scalar, Sequence
+from automax_ros.core.yaml_text import Node, Scalar, YamlMapping, YamlSequence
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.faults import VERBS, PlantVerb, values_of
 from automax_ros.rack.base.local_names import LocalElement, local_named
@@ -40,7 +39,7 @@ from automax_ros.rackfile.reading.values import (
 from automax_ros.runtime.tasks.task import Task
 from automax_ros.scenario.stimuli.player import Action, WavePlayer
 from automax_ros.scenario.stimuli.signals import RackSignals
-from automax_ros.scenario.stimuli.values import Read, Verb, cut_short, named, time_of, value_for, value_verbs
+from automax_ros.scenario.stimuli.values import Read, StimuliVerb, cut_short, named, time_of, value_for, value_verbs
 
 
 def read_plant_work(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
@@ -73,7 +72,7 @@ def _text(verb: Scalar, node: Node, where: str, findings: ProblemList) -> str | 
         message = f"{where} has no control {quoted(verb.text)}"
         findings.add("AMX6742", message, verb.span, near_or_listed(verb.text, VERBS))
         return None
-    if isinstance(node, Mapping) and known.keys:
+    if isinstance(node, YamlMapping) and known.keys:
         text = _join_values(known, node, f"{verb.text} of {where}", findings)
         if not text:
             return None
@@ -82,7 +81,7 @@ def _text(verb: Scalar, node: Node, where: str, findings: ProblemList) -> str | 
     try:
         values_of(verb.text, text)
     except ParameterError:
-        given = quoted(text) if isinstance(node, Mapping) and known.keys else kind_of(node)
+        given = quoted(text) if isinstance(node, YamlMapping) and known.keys else kind_of(node)
         message = f"{verb.text} of {where} cannot be {given}: it takes {known.wants}"
         findings.add("AMX6736", message, node.span)
         return None
@@ -93,7 +92,7 @@ def _plain(node: Node) -> str:
     return node.text if isinstance(node, Scalar) and not node.is_null else ""
 
 
-def _join_values(verb: PlantVerb, node: Mapping, what: str, findings: ProblemList) -> str:
+def _join_values(verb: PlantVerb, node: YamlMapping, what: str, findings: ProblemList) -> str:
     """Return the values of a form with keys, one after the other; "" if a problem was reported.
 
     A value that is left out before another is the usual one.
@@ -109,9 +108,9 @@ def _join_values(verb: PlantVerb, node: Mapping, what: str, findings: ProblemLis
     )
 
 
-def control_verbs(rack: Rack) -> AbstractMapping[str, Verb]:
+def control_verbs(rack: Rack) -> Mapping[str, StimuliVerb]:
     """Return the verbs ``module`` and ``plant``."""
-    return {"module": Verb(partial(_module, rack)), "plant": Verb(partial(read_plant_work, rack))}
+    return {"module": StimuliVerb(partial(_module, rack)), "plant": StimuliVerb(partial(read_plant_work, rack))}
 
 
 def _module(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
@@ -141,7 +140,7 @@ def _module(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Ac
 
 
 def _is_position(
-    key: Scalar, node: Node, where: str, known: AbstractMapping[str, tuple[str, ...]], findings: ProblemList
+    key: Scalar, node: Node, where: str, known: Mapping[str, tuple[str, ...]], findings: ProblemList
 ) -> bool:
     """Return whether a control of a module has the position in a file; report it if not."""
     if key.text not in known:
@@ -197,24 +196,24 @@ ALL = "all"
 _PATH_LIMIT = 200
 
 
-def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> AbstractMapping[str, Verb]:
+def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> Mapping[str, StimuliVerb]:
     """Return all verbs of a rack. Sources to reload must be in the folder of the stimuli file or of the rack file."""
     tasks = _Tasks(rack)
     sources = _Sources(rack, stimuli_file, allow_outside)
     operations = rack.operations
     return {
         **value_verbs(RackSignals(rack)),
-        "force": Verb(partial(_force, rack), everywhere=True),
-        "unforce": Verb(partial(_unforce, rack), everywhere=True),
-        "tune": Verb(tasks.tune),
-        "run": Verb(tasks.each(operations.run)),
-        "stop": Verb(tasks.each(operations.stop)),
-        "delete": Verb(tasks.each(operations.delete)),
-        "reload": Verb(sources.reload),
-        "run_all": Verb(_switch(operations.run_all)),
-        "stop_all": Verb(_switch(partial(operations.stop_all, "STOP ALL of the stimuli"))),
-        "clear_errors": Verb(tasks.each(operations.clear_errors, every=operations.clear_errors)),
-        "power": Verb(partial(_power, rack)),
+        "force": StimuliVerb(partial(_force, rack), everywhere=True),
+        "unforce": StimuliVerb(partial(_unforce, rack), everywhere=True),
+        "tune": StimuliVerb(tasks.tune),
+        "run": StimuliVerb(tasks.each(operations.run)),
+        "stop": StimuliVerb(tasks.each(operations.stop)),
+        "delete": StimuliVerb(tasks.each(operations.delete)),
+        "reload": StimuliVerb(sources.reload),
+        "run_all": StimuliVerb(_switch(operations.run_all)),
+        "stop_all": StimuliVerb(_switch(partial(operations.stop_all, "STOP ALL of the stimuli"))),
+        "clear_errors": StimuliVerb(tasks.each(operations.clear_errors, every=operations.clear_errors)),
+        "power": StimuliVerb(partial(_power, rack)),
         **control_verbs(rack),
     }
 
@@ -232,7 +231,7 @@ def _switch(operation: Callable[[], None]) -> Read:
 
 def names_of(node: Node, what: str, findings: ProblemList) -> list[Scalar]:
     """Return the names of a list; a single name needs no list."""
-    items = node.items if isinstance(node, Sequence) else (node,)
+    items = node.items if isinstance(node, YamlSequence) else (node,)
     found = [item for item in items if isinstance(item, Scalar) and not item.is_null]
     for item in items:
         if not isinstance(item, Scalar) or item.is_null:
@@ -372,7 +371,7 @@ class _Sources:
         return found
 
     def _file_and_state(self, node: Node, what: str, key: Scalar, findings: ProblemList) -> tuple[Scalar | None, bool]:
-        if not isinstance(node, Mapping):
+        if not isinstance(node, YamlMapping):
             return _file(node, what, findings), False
         section = Section(node.entries, what, ("file", "keep_state"), findings)
         section.require(("file",), what, key.span, findings)

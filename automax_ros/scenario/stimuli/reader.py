@@ -12,8 +12,8 @@ from pathlib import Path
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.text import near_or_listed, quoted
-from automax_ros.core.yaml_text import Mapping as Keys
-from automax_ros.core.yaml_text import Node, Scalar, Sequence, read_yaml
+from automax_ros.core.yaml_text import Node, Scalar, YamlSequence, read_yaml
+from automax_ros.core.yaml_text import YamlMapping as Keys
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.rackfile.reading.values import ProblemList, kind_of, report_twice
@@ -22,7 +22,7 @@ from automax_ros.scenario.stimuli.player import Stimulus
 from automax_ros.scenario.stimuli.rack_verbs import rack_verbs
 from automax_ros.scenario.stimuli.schema import MOST_ENTRIES, VERB_SCHEMAS
 from automax_ros.scenario.stimuli.signals import LoneSignals
-from automax_ros.scenario.stimuli.values import VALUE_VERBS, Verb, time_of, value_verbs
+from automax_ros.scenario.stimuli.values import VALUE_VERBS, StimuliVerb, time_of, value_verbs
 
 MOST_BYTES = 2_000_000
 _MOST_NODES = 1_000_000
@@ -56,7 +56,7 @@ def read_for_task(path: Path, lone: StandaloneTask) -> StimuliFile:
     return _read(path, value_verbs(LoneSignals(lone)), RACK_ONLY)
 
 
-def _read(path: Path, verbs: Mapping[str, Verb], elsewhere: tuple[str, ...]) -> StimuliFile:
+def _read(path: Path, verbs: Mapping[str, StimuliVerb], elsewhere: tuple[str, ...]) -> StimuliFile:
     findings = ProblemList()
     source = SourceText(str(path), _text_of(path, findings))
     root = None
@@ -81,7 +81,7 @@ def _text_of(path: Path, findings: ProblemList) -> str:
 
 @dataclass(frozen=True)
 class _Reader:
-    verbs: Mapping[str, Verb]
+    verbs: Mapping[str, StimuliVerb]
     elsewhere: tuple[str, ...]
     findings: ProblemList
 
@@ -89,7 +89,7 @@ class _Reader:
         """Return the entries of a file; an empty file has none."""
         if isinstance(root, Scalar) and root.is_null:
             return []
-        if not isinstance(root, Sequence):
+        if not isinstance(root, YamlSequence):
             self.findings.add("AMX6731", f"a stimuli file is a list of entries, not {kind_of(root)}", root.span, _FORM)
             return []
         if len(root.items) > MOST_ENTRIES:

@@ -36,7 +36,7 @@ Read = Callable[[Node, str, ProblemList], Sequence[Action]]
 
 
 @dataclass(frozen=True)
-class Verb:
+class StimuliVerb:
     """Reader of a verb; ``is_value`` if it only writes values, ``everywhere`` as in ``Stimulus``."""
 
     read: Read
@@ -172,7 +172,7 @@ def goes_on_for_ever(stimuli: Iterable[Stimulus]) -> bool:
     return any(isinstance(action, DriveSignal) and action.wave.for_ns is None for action in actions)
 
 
-def value_verbs(signals: Signals) -> Mapping[str, Verb]:
+def value_verbs(signals: Signals) -> Mapping[str, StimuliVerb]:
     """Return the verbs for the signals of a rack or of a task."""
 
     def read_set(node: Node, what: str, findings: ProblemList) -> list[Action]:
@@ -185,10 +185,10 @@ def value_verbs(signals: Signals) -> Mapping[str, Verb]:
         return found
 
     return {
-        "set": Verb(read_set, is_value=True),
-        "ramp": Verb(_wave_reader(signals, ("to", "over"), _ramp), is_value=True),
-        "sine": Verb(_wave_reader(signals, ("mean", "amplitude", "hz", "for"), _sine), is_value=True),
-        "square": Verb(_wave_reader(signals, ("low", "high", "hz", "for"), _square), is_value=True),
+        "set": StimuliVerb(read_set, is_value=True),
+        "ramp": StimuliVerb(_wave_reader(signals, ("to", "over"), _ramp), is_value=True),
+        "sine": StimuliVerb(_wave_reader(signals, ("mean", "amplitude", "hz", "for"), _sine), is_value=True),
+        "square": StimuliVerb(_wave_reader(signals, ("low", "high", "hz", "for"), _square), is_value=True),
     }
 
 

@@ -10,7 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE, FAMILIES
-from automax_ros.blocks.declare.declaration import CALL_FACTS, HELPERS, Access, Form, Platform, Special, Time, Times
+from automax_ros.blocks.declare.declaration import (
+    CALL_FACTS,
+    HELPERS,
+    Access,
+    BlockTimes,
+    Form,
+    Platform,
+    Special,
+    Time,
+)
 from automax_ros.blocks.declare.instance import Instance
 from automax_ros.blocks.discrete.shift import STRUCTURE_STATES
 from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES
@@ -357,7 +366,7 @@ def test_pc3000_times_are_0_7_of_the_7010s(name):
 @each_block
 def test_times_are_there_for_every_processor_that_runs_the_block(block):
     if block.line_scan is not None:
-        assert block.times == Times(None, None, None, None), "the manual prints no time of a current minor loop"
+        assert block.times == BlockTimes(None, None, None, None), "the manual prints no time of a current minor loop"
         return
     assert block.name in ROWS
     assert (block.times.udc is not None) == (Platform.UDC in block.runs_on)

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from automax_ros.cli.operate.actions import ACTIONS, add_actions
-from automax_ros.cli.operate.ctl import Session
+from automax_ros.cli.operate.ctl import RackSession
 from automax_ros.cli.operate.prompt import run_shell
 from automax_ros.cli.visible import VisibleOutput
 from automax_ros.core.user_error import UsageError
@@ -72,7 +72,7 @@ def do(rack: Rack, *words: str) -> int:
     parser = argparse.ArgumentParser()
     add_actions(parser)
     arguments = parser.parse_args(words)
-    return Session(rack, lambda: False).do(ACTIONS[arguments.action], arguments)
+    return RackSession(rack, lambda: False).do(ACTIONS[arguments.action], arguments)
 
 
 def test_a_value_that_was_there_already_is_told(capsys):
@@ -190,8 +190,8 @@ def test_a_prompt_goes_on_after_errors_and_ends_with_its_input(monkeypatch, caps
     class Connected:
         def __init__(self, *_: object) -> None: ...
 
-        def __enter__(self) -> Session:
-            return Session(rack, lambda: False)
+        def __enter__(self) -> RackSession:
+            return RackSession(rack, lambda: False)
 
         def __exit__(self, *_: object) -> None: ...
 

@@ -11,7 +11,7 @@ from sweep.helpers import plan_of, rack_in
 from automax_ros.cli.racks import sweep_output
 from automax_ros.core.user_error import UsageError
 from automax_ros.sweep.points import grid, read_varied, sample
-from automax_ros.sweep.run import Outcome, Plan, Row
+from automax_ros.sweep.run import Plan, Row, RunOutcome
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         points = sample(varied, count, 1) if count else grid(varied)
         sums = [sum(value for value in point if not isinstance(value, str)) for point in points]
         rows = [
-            Row(number, point, Outcome((one, None)))
+            Row(number, point, RunOutcome((one, None)))
             for number, (point, one) in enumerate(zip(points, sums, strict=True), 1)
         ]
         sweep_output.draw(plan, rows, rows[:1], tmp_path / "picture.png")

@@ -9,7 +9,7 @@ import pytest
 from recordings.independent import GOLDEN, steps_of
 from recordings.recordings import MS, TABLE, image_of, record, sample_recording, write_of
 
-from automax_ros.cli.output.figure import Layout, figure_of, save
+from automax_ros.cli.output.figure import FigureLayout, figure_of, save
 from automax_ros.core.types import DataType
 from automax_ros.messages.types.messages import Scan, ScanError
 from automax_ros.recordings.read.common_log import Watched
@@ -46,7 +46,7 @@ def test_a_recording_is_read_without_loading_what_runs_a_rack():
 
 def test_lines_are_the_write_log_and_hold_to_the_end():
     shown = traces(GOLDEN, ["LINE_REF%", "CUR_REF%", "SPEED_FPM%"])
-    drawn = lines_of(figure_of(shown, Layout("t")))
+    drawn = lines_of(figure_of(shown, FigureLayout("t")))
     for name, line in drawn.items():
         steps = steps_of(GOLDEN, name)
         assert corners(line)[: len(steps)] == steps
@@ -56,7 +56,7 @@ def test_lines_are_the_write_log_and_hold_to_the_end():
 
 
 def test_a_line_that_lies_under_another_is_seen_through_its_gaps():
-    drawn = lines_of(figure_of(traces(GOLDEN, ["SECT_REF%", "SPEED_FDBK%"]), Layout("t")))
+    drawn = lines_of(figure_of(traces(GOLDEN, ["SECT_REF%", "SPEED_FDBK%"]), FigureLayout("t")))
     under, over = drawn["SECT_REF%"], drawn["SPEED_FDBK%"]
     assert (under.get_linestyle(), over.get_linestyle()) == ("-", "--")
     assert under.get_linewidth() > over.get_linewidth()
@@ -65,7 +65,7 @@ def test_a_line_that_lies_under_another_is_seen_through_its_gaps():
 
 def test_variables_of_one_unit_share_a_lane():
     shown = traces(GOLDEN, ["LINE_REF%", "SPEED_FPM%", "RUN@", "CUR_REF%", "READY@"])
-    figure = figure_of(shown, Layout("t"))
+    figure = figure_of(shown, FigureLayout("t"))
     labels = [
         (axis.get_ylabel(), [line.get_gid() for line in axis.get_lines() if line.get_gid()]) for axis in figure.axes
     ]
@@ -73,13 +73,13 @@ def test_variables_of_one_unit_share_a_lane():
     legends = [[text.get_text().strip() for text in axis.get_legend().get_texts()] for axis in figure.axes[:2]]
     assert legends == [["LINE_REF%", "CUR_REF%"], ["SPEED_FPM%"]]
     assert [label.get_text() for label in figure.axes[2].get_yticklabels()] == ["RUN@", "READY@"]
-    separate = figure_of(shown, Layout("t", separate=True))
+    separate = figure_of(shown, FigureLayout("t", separate=True))
     assert [axis.get_ylabel() for axis in separate.axes] == ["counts", "fpm", "counts", ""]
 
 
 def test_legends_stand_beside_the_data_and_nothing_is_cut_off():
     names = ["LINE_REF%", "SECT_REF%", "SPEED_FDBK%", "CUR_REF%", "ARM_CUR%", "TACH_LOSS@", "FAULT_RESET_PB@"]
-    figure = figure_of(traces(GOLDEN, names), Layout("t", 900))
+    figure = figure_of(traces(GOLDEN, names), FigureLayout("t", 900))
     figure.draw_without_rendering()
     axis = figure.axes[0]
     legend = axis.get_legend().get_window_extent()
@@ -94,7 +94,7 @@ def test_booleans_are_rows_of_logic(automax):
     log = [("/a/variables", TABLE), ("/a/backplane/snapshot", image_of(0, 0, {(3, 0): 0}))]
     log += [("/a/backplane", write_of(i, i * 10 * MS, {(3, 0): i % 2})) for i in range(1, 6)]
     shown = traces(record(automax.folder / "b", log), ["RUN@"])
-    (line,) = lines_of(figure_of(shown, Layout("t"))).values()
+    (line,) = lines_of(figure_of(shown, FigureLayout("t"))).values()
     low = line.get_ydata()[0]
     assert [(round(time, 6), y > low) for time, y in corners(line)] == [
         (0.0, False),
@@ -114,7 +114,7 @@ def test_errors_are_ticks_with_their_code(automax):
         log.append(("/a/scans", Scan(index * MS, 1, task, index, errors=errors)))
         log.append(("/a/backplane", write_of(index, index * MS, {(0, 0): index})))
     bag = record(automax.folder / "b", log)
-    figure = figure_of(traces(bag, ["REF%"]), Layout("t"))
+    figure = figure_of(traces(bag, ["REF%"]), FigureLayout("t"))
     axis = figure.axes[-1]
     ticks = {line.get_gid(): list(line.get_xdata()) for line in axis.get_lines() if line.get_gid()}
     assert ticks == {"SLOW": [0.02], "FAST": [0.06, 0.061]}
@@ -129,7 +129,7 @@ def test_a_line_of_millions_is_drawn_with_its_peak():
     values = np.sin(times)
     values[1_234_567] = 50.0
     line = Line(Watched("GAIN", 0, 0, DataType.REAL), times, values)
-    (drawn,) = lines_of(figure_of(Traces("R", 0.0, 2000.0, (line,), (), 0), Layout("t", 1000))).values()
+    (drawn,) = lines_of(figure_of(Traces("R", 0.0, 2000.0, (line,), (), 0), FigureLayout("t", 1000))).values()
     assert len(drawn.get_xdata()) <= 4001
     assert (1234.567, 50.0) in corners(drawn)
 
@@ -139,7 +139,7 @@ def test_odd_texts_are_drawn_as_they_stand(automax, name):
     line = Line(Watched(name, 0, 0, DataType.REAL, name), np.array([0.0, 1.0]), np.array([0.0, 1.0]))
     logic = Line(Watched(name, 0, 0, DataType.BOOLEAN), np.array([0.0]), np.array([1.0]))
     marks = (ErrorMark(0.5, name, 1, 7001),)
-    figure = figure_of(Traces("R", 0.0, 1.0, (line, logic), marks, 3), Layout(name))
+    figure = figure_of(Traces("R", 0.0, 1.0, (line, logic), marks, 3), FigureLayout(name))
     save(figure, automax.folder / "odd.svg")
     assert figure.axes[0].get_legend().get_texts()[0].get_text().strip()
 

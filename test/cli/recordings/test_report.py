@@ -8,7 +8,7 @@ import zlib
 
 import pytest
 
-from automax_ros.cli.output.figure import Layout, figure_of
+from automax_ros.cli.output.figure import FigureLayout, figure_of
 from automax_ros.recordings.tables.series import Window
 from automax_ros.replay.drive_report.drive_report import drive_report
 from automax_ros.replay.drive_report.rack_report import rack_report
@@ -215,7 +215,7 @@ def test_lines_of_a_lane_that_agree_are_all_seen(automax, bag):
         recording.plant(2.0, current_a=AMPS / 4)
     report = drive_report(automax.folder / "bag")
     ((run, marks),) = report.drives
-    figure = figure_of(report.traces(run, marks), Layout("one"))
+    figure = figure_of(report.traces(run, marks), FigureLayout("one"))
     lane = next(axis for axis in figure.axes if axis.get_ylabel() == "% of rated current")
     lines = [line for line in lane.get_lines() if line.get_gid()]  # the others mark errors
     labels = [text.get_text().strip() for text in lane.get_legend().get_texts()]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.cli.main import main
-from automax_ros.cli.options.task import Target, check_task_file
+from automax_ros.cli.options.task import TaskTarget, check_task_file
 from automax_ros.cli.output.csv_input import MAX_LINE, CsvFault
 from automax_ros.cli.tasks.trace import InputTable
 from automax_ros.core.problems import PROBLEMS
@@ -141,7 +141,7 @@ def lone(tmp_path_factory):
     """A task to be set, and the path of its table."""
     folder = tmp_path_factory.mktemp("table")
     (folder / "TASK.BLK").write_text(TASK)
-    _, result = check_task_file(folder / "TASK.BLK", Target(Platform.AUTOMAX, 5_500_000))
+    _, result = check_task_file(folder / "TASK.BLK", TaskTarget(Platform.AUTOMAX, 5_500_000))
     assert result.program is not None
     task = StandaloneTask(result.program)
     task.task.run()

@@ -19,7 +19,7 @@ from automax_ros.compile.native.run.cache import NativeCache
 from automax_ros.compile.native.translate.calls import called
 from automax_ros.compile.native.translate.environment import Environment
 from automax_ros.compile.native.translate.frame import Frame, Unit
-from automax_ros.compile.native.translate.ranges import ANY_BOOL, ANY_REAL, Kind, Range
+from automax_ros.compile.native.translate.ranges import ANY_BOOL, ANY_REAL, NumberKind, Range
 from automax_ros.compile.native.translate.translation import fixed_parts
 from automax_ros.compile.native.translate.typed import WIDE, bare, c_type
 from automax_ros.core import numbers
@@ -31,12 +31,12 @@ PYTHON_RAISES = (ZeroDivisionError, OverflowError, ValueError)
 
 def whole(low: int, high: int) -> Range:
     """Integers from one to another."""
-    return Range(Kind.INT, low, high)
+    return Range(NumberKind.INT, low, high)
 
 
 def real(low: float, high: float) -> Range:
     """REALs from one to another."""
-    return Range(Kind.REAL, low, high)
+    return Range(NumberKind.REAL, low, high)
 
 
 WORD, LONG, EXACT = whole(-32768, 32767), whole(-(2**31), 2**31 - 1), whole(-(2**53), 2**53)
@@ -121,7 +121,7 @@ class Built:
         made, count = self.translated[operation], len(arguments)
         ends = np.zeros(count, np.int64)
         columns = [
-            np.array([row[place] for row in arguments], np.float64 if item.kind is Kind.REAL else np.int64)
+            np.array([row[place] for row in arguments], np.float64 if item.kind is NumberKind.REAL else np.int64)
             for place, item in enumerate(operation.arguments)
         ]
         outs = [np.zeros(2 * count, np.float64 if kind == "double" else np.int64) for kind in made.results]
@@ -191,18 +191,18 @@ REAL_EDGES = [*REAL_EDGES, 0.0, -0.0, math.inf, -math.inf, math.nan]
 
 def edges(known: Range) -> list[Any]:
     """The values of a range at which operations change their ways."""
-    if known.kind is Kind.BOOL:
+    if known.kind is NumberKind.BOOL:
         return [False, True]
-    if known.kind is Kind.REAL:
+    if known.kind is NumberKind.REAL:
         return [value for value in REAL_EDGES if math.isnan(value) or known.low <= value <= known.high]
     return [value for value in WHOLE_EDGES if known.low <= value <= known.high]
 
 
 def some(known: Range, draw: random.Random) -> Any:
     """A value of a range, of any size."""
-    if known.kind is Kind.BOOL:
+    if known.kind is NumberKind.BOOL:
         return draw.random() < 0.5
-    if known.kind is Kind.REAL:
+    if known.kind is NumberKind.REAL:
         value = math.ldexp(draw.uniform(-1.0, 1.0), draw.choice((0, 1, 8, 31, 63, draw.randint(-80, 1024))))
         if draw.random() < 0.3 and abs(value) < 1e15:
             value = round(value * 2) / 2

@@ -7,7 +7,7 @@ import pytest
 
 from automax_ros.drive.assess.limits import largest_inductance_mh
 from automax_ros.drive.circuit.conduction import EventKind
-from automax_ros.drive.current_loop.bridge_change import FLOOR, BridgeChange, Stage, preset_us
+from automax_ros.drive.current_loop.bridge_change import FLOOR, BridgeChange, ChangeStage, preset_us
 from automax_ros.drive.current_loop.signals import OVERCURRENT, VOLTAGE, VOLTS, Measured, gate_numbers
 from drive.current_loop.support import Bench, parameters_of
 
@@ -145,7 +145,7 @@ def test_above_the_limits_of_table_3_nothing_fires_across_either(size, times, la
 def test_a_reference_that_turns_back_before_zero_current_changes_nothing():
     bench = running("150hp", 60, 450.0, 4095)
     bench.set(reference=-500)
-    while bench.loop.control.change.stage == Stage.NONE:
+    while bench.loop.control.change.stage == ChangeStage.NONE:
         bench.scan()
     bench.set(reference=4095)
     scans = bench.run(0.4)
@@ -177,11 +177,11 @@ def test_old_bridge_is_blocked_until_its_scrs_have_recovered():
     change = BridgeChange()
     scan_us = 2777.8
     assert not change.scan(Measured(0, 1000), -100.0, scan_us, fast=False)
-    assert change.stage == Stage.BACK
+    assert change.stage == ChangeStage.BACK
     assert not change.scan(Measured(0, 100, 300, 300), -100.0, scan_us, fast=False)
-    assert change.stage == Stage.OFF
+    assert change.stage == ChangeStage.OFF
     assert change.scan(Measured(0, 0, 2778, 3078), -100.0, scan_us, fast=False)
-    assert (change.bridge, change.stage) == (2, Stage.NONE)
+    assert (change.bridge, change.stage) == (2, ChangeStage.NONE)
 
 
 def test_preset_lies_at_the_angle_of_the_emf():

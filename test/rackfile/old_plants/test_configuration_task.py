@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import automax_ros.core
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rackfile.loader import load_stored
-from automax_ros.rackfile.model.config import Point
+from automax_ros.rackfile.model.config import IoPoint
 from automax_ros.rackfile.old_plants.configuration_task import DefinedTask, read_configuration
 from automax_ros.rackfile.old_plants.import_ import rack_file_of
 
@@ -37,8 +37,8 @@ def test_what_a_configuration_defines():
     found = read(GOOD)
     assert [item.code for item in found.diagnostics] == []
     assert [(item.declared.name, item.point, item.non_volatile, item.line) for item in found.commons] == [
-        ("START_PB@", Point(5, 0, 3), False, 2),
-        ("START_WORD%", Point(5, 0), False, 3),
+        ("START_PB@", IoPoint(5, 0, 3), False, 2),
+        ("START_WORD%", IoPoint(5, 0), False, 3),
         ("LINE_REF%", None, False, 5),
         ("TABLE%", None, False, 5),
         ("NOTE$", None, False, 5),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rack.helpers import HEAD, codes, loaded, write
 
 from automax_ros.core.diagnostics import render_all
-from automax_ros.core.yaml_text import MAX_DEPTH, Mapping, Node, Scalar, read_yaml
+from automax_ros.core.yaml_text import MAX_DEPTH, Node, Scalar, YamlMapping, read_yaml
 from automax_ros.rackfile.loader import LoadResult, load
 from automax_ros.rackfile.reading.files import MAX_BYTES
 from automax_ros.rackfile.reading.values import MAX_FINDINGS, ProblemList
@@ -76,7 +76,7 @@ def plain(node: Node) -> object:
     """What PyYAML's loader of plain texts makes of the same."""
     if isinstance(node, Scalar):
         return node.text
-    if isinstance(node, Mapping):
+    if isinstance(node, YamlMapping):
         return {key.text: plain(value) for key, value in node.entries}
     return [plain(item) for item in node.items]
 

@@ -19,7 +19,7 @@ from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.messages.types.messages import Int16, Scan, ScanError
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.recordings.info.info import TaskInfo, bag_info, task_facts
+from automax_ros.recordings.info.info import RecordedTask, bag_info, task_facts
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.write.recorder import Recorder
@@ -99,7 +99,7 @@ def test_a_rack_file_that_is_none_tells_nothing_of_the_tasks(tmp_path: Path) -> 
 @settings(deadline=None, derandomize=True)
 @given(st.sets(st.integers(0, 400), min_size=1))
 def test_missing_numbers(numbers: set[int]) -> None:
-    task = TaskInfo()
+    task = RecordedTask()
     for number in sorted(numbers):
         task.count(number)
     gaps = set(range(min(numbers), max(numbers) + 1)) - numbers
@@ -108,7 +108,7 @@ def test_missing_numbers(numbers: set[int]) -> None:
 
 
 def test_a_task_that_is_started_again_misses_nothing() -> None:
-    task = TaskInfo()
+    task = RecordedTask()
     for number in (0, 1, 2, 3, 0, 1, 3):
         task.count(number)
     assert (task.scans, task.first, task.last, task.missing, task.restarts) == (7, 0, 3, 1, 1)

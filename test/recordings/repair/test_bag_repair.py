@@ -24,7 +24,7 @@ from automax_ros.recordings.mcap.errors import BagError, RecordingError
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.repair.contents import SCAN, WRITE
 from automax_ros.recordings.repair.repairing import repair
-from automax_ros.recordings.repair.rewriting import Found, kept
+from automax_ros.recordings.repair.rewriting import FoundScan, kept
 from automax_ros.recordings.write.data_file import COMPRESSIONS, StorageOptions
 from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.recordings.write.writer import BagWriter
@@ -320,17 +320,17 @@ def test_a_private_record_inside_a_chunk_costs_nothing(tmp_path: Path) -> None:
     assert messages(report.output) == messages(bag)
 
 
-def scan(stamp: int, committed: int) -> Found:
+def scan(stamp: int, committed: int) -> FoundScan:
     values = Values((1,) * committed, (0,) * committed, (1.0,) * committed)
-    return Found(1, 1, stamp, stamp, encode(Scan(stamp, 1, "A", 1, committed=values)))
+    return FoundScan(1, 1, stamp, stamp, encode(Scan(stamp, 1, "A", 1, committed=values)))
 
 
-def write(stamp: int, count: int) -> Found:
+def write(stamp: int, count: int) -> FoundScan:
     values = Values((1,) * count, (0,) * count, (1.0,) * count)
-    return Found(2, 1, stamp, stamp, encode(CommonWrite(stamp, 1, 1, 1, 1, 1, values)))
+    return FoundScan(2, 1, stamp, stamp, encode(CommonWrite(stamp, 1, 1, 1, 1, 1, values)))
 
 
-VALUE_MESSAGE = Found(3, 1, 9, 9, encode(Int16(1)))
+VALUE_MESSAGE = FoundScan(3, 1, 9, 9, encode(Int16(1)))
 TYPES = {1: SCAN, 2: WRITE, 3: "std_msgs/msg/Int16"}
 
 
@@ -346,11 +346,11 @@ TYPES = {1: SCAN, 2: WRITE, 3: "std_msgs/msg/Int16"}
         ([scan(1, 1), write(1, 1), scan(9, 3), write(9, 3), VALUE_MESSAGE], True, 2),
         ([scan(1, 1), write(1, 1), scan(9, 1), write(9, 1)], True, 2),
         ([VALUE_MESSAGE, VALUE_MESSAGE], True, 2),
-        ([scan(1, 1), write(1, 1), Found(1, 1, 2, 2, b"\0\1\0\0")], False, 2),
+        ([scan(1, 1), write(1, 1), FoundScan(1, 1, 2, 2, b"\0\1\0\0")], False, 2),
         ([], True, 0),
     ],
 )
-def test_only_whole_instants_are_kept(found: list[Found], cut_inside: bool, count: int) -> None:
+def test_only_whole_instants_are_kept(found: list[FoundScan], cut_inside: bool, count: int) -> None:
     assert kept(found, lambda channel: TYPES[channel], cut=cut_inside) == count
 
 

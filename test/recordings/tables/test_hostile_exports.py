@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.cli.output.figure import Layout, figure_of
+from automax_ros.cli.output.figure import FigureLayout, figure_of
 from automax_ros.cli.recordings.bag_info import as_data, lines_of
 from automax_ros.recordings.info.info import bag_info, task_facts
 from automax_ros.recordings.mcap.errors import BagError
@@ -47,7 +47,7 @@ def use(file: Path, folder: Path) -> None:
     with contextlib.suppress(BagError):
         write_csv(ScanTable(file, "SPEED", Window(0, 40_000_000)), folder / "out.csv")
     with contextlib.suppress(BagError):
-        figure_of(traces(file, ["REF%", "RUN@"]), Layout("t"))
+        figure_of(traces(file, ["REF%", "RUN@"]), FigureLayout("t"))
 
 
 @settings(
@@ -78,4 +78,4 @@ def test_the_unchanged_recording_is_sound(plain: bytes, tmp_path: Path) -> None:
     info = bag_info(file, check=True)
     assert (info.problems, info.scans) == ([], 10)
     write_csv(CommonTable(file), tmp_path / "out.csv")
-    figure_of(traces(file, ["REF%", "RUN@"]), Layout("t"))
+    figure_of(traces(file, ["REF%", "RUN@"]), FigureLayout("t"))

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recordings.recordings import without_checksums
 
-from automax_ros.cli.output.figure import Layout, figure_of
+from automax_ros.cli.output.figure import FigureLayout, figure_of
 from automax_ros.cli.recordings.report import page
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.drive_report.drive_report import drive_report
@@ -48,4 +48,4 @@ def test_changed_bytes_give_a_page_or_an_error(
         assert len(text) < 1_000_000
         if len(changes) == 1:
             for run, marks in report.drives:
-                figure_of(report.traces(run, marks), Layout("t"))
+                figure_of(report.traces(run, marks), FigureLayout("t"))

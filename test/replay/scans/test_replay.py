@@ -12,7 +12,7 @@ from automax_ros.messages.types.messages import Scan
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.recordings.read.reader import BagReader
-from automax_ros.replay.scans.report import Kind
+from automax_ros.replay.scans.report import DifferenceKind
 from replay.replays import SPEED, WORK, edited, record, recorded, replayed
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "section_drive"
@@ -116,7 +116,7 @@ def test_each_differing_scan_is_that_of_a_rack_with_the_other_gain(bag, tmp_path
     (found,) = report.differences
     assert (found.task, found.kind, found.name, found.lines, found.unit) == (
         "SPEED",
-        Kind.VARIABLE,
+        DifferenceKind.VARIABLE,
         "OUT%",
         (130,),
         "counts",

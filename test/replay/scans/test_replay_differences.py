@@ -14,7 +14,7 @@ from automax_ros.core.types import same_bits
 from automax_ros.messages.types.messages import Scan, ScanError, TaskState, Values
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.scans.compare import SETTLED_SCANS, DifferenceCounts, Found, Label, Seen, within
-from automax_ros.replay.scans.report import Kind
+from automax_ros.replay.scans.report import DifferenceKind
 from replay.replays import SPEED, WORK, edited, record, recorded, replayed, rewritten
 
 
@@ -37,7 +37,7 @@ def bag(tmp_path_factory) -> Path:
 def test_kinds_of_variables(bag, task, text, name, line, recorded_value, replayed_value):
     report = replayed(bag, {task: text})
     found = report.differences[0]
-    assert (found.task, found.kind, found.name) == (task, Kind.VARIABLE, name)
+    assert (found.task, found.kind, found.name) == (task, DifferenceKind.VARIABLE, name)
     assert line in found.lines
     assert (found.first.recorded, found.first.replayed) == (recorded_value, replayed_value)
     assert (found.greatest is None) == isinstance(recorded_value, (bool, str))
@@ -49,7 +49,7 @@ def test_kinds_of_variables(bag, task, text, name, line, recorded_value, replaye
 def test_an_error_less_is_a_difference_of_an_edited_task(bag):
     report = replayed(bag, {"WORK": edited(WORK, ("OUT% > 200", "OUT% > 32000"))})
     (found,) = report.differences
-    assert (found.kind, found.name) == (Kind.ERRORS, "run-time errors")
+    assert (found.kind, found.name) == (DifferenceKind.ERRORS, "run-time errors")
     assert found.first.recorded == (
         "AMX7020 value clamped on assignment to an INTEGER variable, AMX7024 division by zero in an expression"
     )
@@ -183,7 +183,7 @@ def test_same_source_must_write_the_same_in_the_same_order(bag, tmp_path):
     """A recorded write of COUNT! is exchanged: the variable differs. Two exchanged writes: only the order does."""
     other = rewritten(bag, tmp_path / "value", change_scan(40, written=lambda values: nth(values, 5, 999)))
     (found,) = replayed(other).differences
-    assert (found.kind, found.name, found.scans) == (Kind.VARIABLE, "COUNT!", 1)
+    assert (found.kind, found.name, found.scans) == (DifferenceKind.VARIABLE, "COUNT!", 1)
     assert (found.first.scan, found.first.recorded, found.first.replayed) == (40, 999, 45)
 
     def swapped(values: Values) -> Values:
@@ -192,7 +192,7 @@ def test_same_source_must_write_the_same_in_the_same_order(bag, tmp_path):
 
     other = rewritten(bag, tmp_path / "order", change_scan(40, written=swapped))
     (found,) = replayed(other).differences
-    assert (found.kind, found.name, found.first.scan) == (Kind.WRITES, "order of writes", 40)
+    assert (found.kind, found.name, found.first.scan) == (DifferenceKind.WRITES, "order of writes", 40)
     assert str(found.first.recorded).startswith("COPY$ = ")
     assert str(found.first.replayed).startswith("TOTAL = ")
 
@@ -200,7 +200,7 @@ def test_same_source_must_write_the_same_in_the_same_order(bag, tmp_path):
 def test_same_source_must_log_errors_at_the_same_lines(bag, tmp_path):
     other = rewritten(bag, tmp_path / "bag", change_scan(40, errors=lambda _: (ScanError(191, 7020),)))
     (found,) = replayed(other).differences
-    assert (found.kind, found.first.scan) == (Kind.ERRORS, 40)
+    assert (found.kind, found.first.scan) == (DifferenceKind.ERRORS, 40)
     assert found.first.recorded == "line 191 AMX7020 value clamped on assignment to an INTEGER variable"
 
 
@@ -234,7 +234,12 @@ def test_states_are_compared_bit_for_bit(bag, tmp_path):
 
     report = replayed(rewritten(bag, tmp_path / "bag", change))
     (found,) = report.differences
-    assert (found.kind, found.name, found.first.scan, found.task) == (Kind.STATE, "state 120 LAG.y1", 1, "SPEED")
+    assert (found.kind, found.name, found.first.scan, found.task) == (
+        DifferenceKind.STATE,
+        "state 120 LAG.y1",
+        1,
+        "SPEED",
+    )
     assert report.first is not None
     assert not report.identical
 
@@ -243,7 +248,7 @@ def test_task_that_stops_by_itself_is_told(bag):
     report = replayed(bag, {"WORK": edited(WORK, ("200 END", "195 IF COUNT! = 50 THEN STOP\n200 END"))})
     (found,) = report.differences
     assert (found.kind, found.first.scan, found.first.recorded, found.first.replayed) == (
-        Kind.STATUS,
+        DifferenceKind.STATUS,
         46,
         "runs",
         "ended by STOP",
@@ -312,7 +317,7 @@ def numbers(differences: list[float]) -> tuple[int, float, float] | None:
     """Where and how a row of differences settles; scans count from 1."""
     tallies = DifferenceCounts(0, 10)
     for scan, difference in enumerate(differences, 1):
-        found = [Found(Kind.VARIABLE, "X", 0, difference)] if difference else []
+        found = [Found(DifferenceKind.VARIABLE, "X", 0, difference)] if difference else []
         tallies.scan("TASK", scan, scan, found, lambda *_: Label("X"), Seen)
     (result,) = tallies.differences()
     return result.settled and (result.settled.scan, result.settled.low, result.settled.high)

@@ -11,7 +11,7 @@ from automax_ros.messages.types.messages import CommonWrite, Scan
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
-from automax_ros.replay.scans.report import Kind
+from automax_ros.replay.scans.report import DifferenceKind
 from automax_ros.runtime.scan.drive_record import COMMAND_VIEW, MEASURED_VIEW
 from replay.replays import edited, record, replayed, rewritten
 
@@ -82,7 +82,7 @@ def test_edited_gain_shows_at_the_first_scan_that_does_otherwise(bag, tmp_path):
     report = replayed(bag, {"CML": text})
     assert (report.first.task, report.first.scan) == ("CML", expected)
     assert expected > 200, "the drive does not regulate before it is started"
-    (pulses,) = [item for item in report.first.differences if item.kind is Kind.COMMAND]
+    (pulses,) = [item for item in report.first.differences if item.kind is DifferenceKind.COMMAND]
     assert pulses.name == "gate pulses commanded to the 57C406"
     assert " at " in pulses.first.recorded
     assert pulses.first.recorded != pulses.first.replayed
@@ -112,7 +112,7 @@ def test_tolerance_passes_over_commands(bag):
 def test_loop_that_became_another_task_commands_nothing(bag):
     other = "10 COMMON REF%\n1000 CALL SCAN_LOOP(TICKS=1)\n1010 END\n"
     report = replayed(bag, {"CML": other})
-    assert {item.first.replayed for item in report.differences if item.kind is Kind.COMMAND} == {"no command"}
+    assert {item.first.replayed for item in report.differences if item.kind is DifferenceKind.COMMAND} == {"no command"}
 
 
 def test_edited_speed_loop_shows_its_own_first_difference(bag):

@@ -16,7 +16,7 @@ from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.replay.scans.report import Kind
+from automax_ros.replay.scans.report import DifferenceKind
 from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Task
 from replay.replays import SPEED, WORK, edited, record, recorded, replayed
@@ -125,7 +125,7 @@ def check_edit(seed: int) -> bool:
         for variable, value in before[scan].items():
             if value != after[scan][variable]:
                 expected.setdefault(variable, scan)
-    found = {item.name: item.first.scan for item in report.differences if item.kind is Kind.VARIABLE}
+    found = {item.name: item.first.scan for item in report.differences if item.kind is DifferenceKind.VARIABLE}
     assert found == expected, f"{old}---\n{new}"
     return bool(expected)
 
@@ -156,7 +156,11 @@ def test_a_stop_that_is_taken_away_is_a_difference(tmp_path):
     bag = recorded(tmp_path, None, WORK=STOPS)
     report = replayed(bag, {"WORK": WORK})
     (found,) = report.differences
-    assert (found.kind, found.first.recorded, found.first.replayed) == (Kind.STATUS, "ended by itself", "runs")
+    assert (found.kind, found.first.recorded, found.first.replayed) == (
+        DifferenceKind.STATUS,
+        "ended by itself",
+        "runs",
+    )
     assert found.first.scan == 16
 
 
@@ -166,7 +170,7 @@ def test_a_stop_in_the_last_recorded_scan_is_a_difference(tmp_path):
     report = replayed(bag, {"WORK": edited(STOPS, ("COUNT! > 20", f"COUNT! >= {5 + last:.0f}"))})
     assert report.tasks[1].scans == 1 + last
     (found,) = report.differences
-    assert (found.kind, found.first.recorded, found.first.replayed) == (Kind.STATUS, "runs", "ended by STOP")
+    assert (found.kind, found.first.recorded, found.first.replayed) == (DifferenceKind.STATUS, "runs", "ended by STOP")
 
 
 def test_a_stop_that_stays_is_none(tmp_path):

@@ -9,7 +9,7 @@ from system.support import wait_until
 from automax_ros.ros.intake import intake as door_module
 from automax_ros.ros.intake import rcl
 from automax_ros.ros.intake.intake import MOST_A_ROUND, MOST_OF_ONE, MessageIntake
-from automax_ros.ros.intake.rcl import MOST_SENDERS, RawMessage, SequenceTracker
+from automax_ros.ros.intake.rcl import MOST_SENDERS, SequenceTracker, TakenMessage
 
 
 class Way:
@@ -99,7 +99,7 @@ def test_senders_tell_copies_and_what_is_missing():
     senders = SequenceTracker()
 
     def missing(sender, number):
-        return senders.missing(RawMessage(b"", 0, 0, number, sender))
+        return senders.missing(TakenMessage(b"", 0, 0, number, sender))
 
     assert [missing(b"a", 5), missing(b"a", 6), missing(b"a", 6), missing(b"a", 9)] == [0, 0, None, 2]
     assert missing(b"b", 100) == 0

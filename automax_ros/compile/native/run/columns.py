@@ -53,7 +53,7 @@ class Written:
 
 
 @dataclass(frozen=True)
-class Executed:
+class ExecutedScans:
     """The result of scans by columns.
 
     Attributes:
@@ -108,8 +108,8 @@ class Columns:
 
     def execute(
         self, state: StateValues, latched: Sequence[Column], count: int, actual: BesideLatch | None
-    ) -> Executed:
-        """Execute ``count`` scans on these columns; the state is changed in place (see ``Executed``).
+    ) -> ExecutedScans:
+        """Execute ``count`` scans on these columns; the state is changed in place (see ``ExecutedScans``).
 
         Raises:
             ValueError: the columns do not fit the task or the count.
@@ -200,10 +200,10 @@ class _Run:
     def done(self) -> int:
         return int(self.call.done)
 
-    def executed(self) -> Executed:
+    def executed(self) -> ExecutedScans:
         done, errors, written = self.done, self.call.errors, self.call.written
         scans, views, elements = (item[:written].copy() for item in self._places)
-        return Executed(
+        return ExecutedScans(
             done,
             [column[:done] for column in self._outputs],
             np.column_stack([item[:errors] for item in self._errors]),

@@ -21,13 +21,13 @@ from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from typing import Any
 
-from automax_ros.compile.base.native_source import NOT_KEPT, Form, NativeSource, NotNative
+from automax_ros.compile.base.native_source import NOT_KEPT, NativeSource, NotNative, TaskFunction
 from automax_ros.compile.base.scan_io import ScanIo, ScanTooLong, StateValues
 from automax_ros.compile.blocks.coefficients import CoefficientFunction
 from automax_ros.compile.compiler import CompiledTask, Scans
 from automax_ros.compile.native.run.build import library, python_options, require_tools
 from automax_ros.compile.native.run.cache import NativeCache
-from automax_ros.compile.native.run.columns import BesideLatch, Column, Columns, Executed
+from automax_ros.compile.native.run.columns import BesideLatch, Column, Columns, ExecutedScans
 from automax_ros.compile.native.run.compiler_process import LIMIT_S
 from automax_ros.compile.native.run.slots import StateSlots, kind_of
 from automax_ros.compile.native.translate.translation import fixed_parts, scans_of, translated
@@ -60,7 +60,7 @@ def kept_translation(compiled: CompiledTask, cache: NativeCache, *, builds: bool
     return source
 
 
-def translation_key(compiled: CompiledTask, form: Form) -> str:
+def translation_key(compiled: CompiledTask, form: TaskFunction) -> str:
     """Return the SHA-256 of all that the translation of a task's scans in a form depends on."""
     program = compiled.program
     symbols = [(item.name, item.type, item.scope, item.dimensions, item.length) for item in program.symbols.values()]
@@ -118,7 +118,7 @@ class NativeTask:
 
     def columns(
         self, state: StateValues, latched: Sequence[Column], count: int, actual: BesideLatch | None = None
-    ) -> Executed:
+    ) -> ExecutedScans:
         """Execute ``count`` scans on columns of latched values: int64, float64 for REALs; the state changes in place.
 
         Raises:

@@ -25,20 +25,20 @@ from automax_ros.compile.native.translate.ranges import (
     ANY_REAL,
     INFINITE,
     INT64_MAX,
-    Kind,
+    NumberKind,
     Range,
     span,
 )
 from automax_ros.compile.native.translate.statements import Body
-from automax_ros.compile.native.translate.typed import Typed, as_real, bare, c_type, literal
+from automax_ros.compile.native.translate.typed import CExpression, as_real, bare, c_type, literal
 from automax_ros.core.numbers import INT32_MAX, INT32_MIN, REAL_MAX, stored_real
 
 _MOST = 2.0**126
 """Largest magnitude of a REAL whose integer is computed; one beyond it ends the scan. No REAL variable comes near."""
-Carry = Callable[[Frame, list[Typed]], list[Typed]]
+Carry = Callable[[Frame, list[CExpression]], list[CExpression]]
 
 
-def called(frame: Frame, function: object, node: ast.Call, known: Environment) -> list[Typed]:
+def called(frame: Frame, function: object, node: ast.Call, known: Environment) -> list[CExpression]:
     """Return the results of a call of a Python function.
 
     Raises:
@@ -64,8 +64,8 @@ def called(frame: Frame, function: object, node: ast.Call, known: Environment) -
 
 
 def _translate(
-    frame: Frame, parsed: ast.FunctionDef, scope: Mapping[str, object], arguments: list[Typed]
-) -> list[Typed]:
+    frame: Frame, parsed: ast.FunctionDef, scope: Mapping[str, object], arguments: list[CExpression]
+) -> list[CExpression]:
     parameters = [argument.arg for argument in parsed.args.args]
     arguments = [_of_annotation(item, given) for given, item in zip(parsed.args.args, arguments, strict=True)]
     exact = _frame_of(frame, parsed, scope, [item.range for item in arguments])
@@ -91,26 +91,26 @@ def _parse(function: FunctionType) -> ast.FunctionDef:
     return parsed
 
 
-def _of_annotation(item: Typed, parameter: ast.arg) -> Typed:
+def _of_annotation(item: CExpression, parameter: ast.arg) -> CExpression:
     """Return an argument converted to the parameter's annotation: an integer for a float is the same number."""
     annotation = parameter.annotation
     wanted = annotation.id if isinstance(annotation, ast.Name) else ""
     if wanted == "float":
         return as_real(item)
-    return item.whole if wanted == "int" and item.range.kind is Kind.BOOL else item
+    return item.whole if wanted == "int" and item.range.kind is NumberKind.BOOL else item
 
 
 def _general(known: Range) -> Range:
     """Return a wider range that many calls share, so that they share the function in C."""
-    if known.kind is Kind.BOOL:
+    if known.kind is NumberKind.BOOL:
         return ANY_BOOL
-    if known.kind is Kind.REAL:
+    if known.kind is NumberKind.REAL:
         return ANY_REAL
     if known.is_wide or known.only is not None:
         return known
     for most in (32768, 2**32, 2**53, INT64_MAX // 2):
         if known.low >= -most and known.high <= most:
-            return Range(Kind.INT, -most, most)
+            return Range(NumberKind.INT, -most, most)
     return known
 
 
@@ -148,44 +148,44 @@ def _define(made: Frame, name: str, parameters: list[str], ranges: list[Range]) 
     return made.unit.function(name, head, "".join(declared) + "\n".join(made.lines) + "\n}")
 
 
-def _deliver(frame: Frame, name: str, texts: list[str], results: list[Range], *, can_end: bool) -> list[Typed]:
+def _deliver(frame: Frame, name: str, texts: list[str], results: list[Range], *, can_end: bool) -> list[CExpression]:
     """Return a call whose second and further results are returned by pointers."""
-    others = [Typed(frame.temporary(item), item) for item in results[1:]]
+    others = [CExpression(frame.temporary(item), item) for item in results[1:]]
     arguments = [*texts, *(f"&{item.text}" for item in others)]
     if can_end:
         arguments.append(frame.ended())
-    return [Typed(f"{name}({', '.join(arguments)})", results[0]), *others]
+    return [CExpression(f"{name}({', '.join(arguments)})", results[0]), *others]
 
 
 # Python's own functions
 
 
-def _absolute(_: Frame, arguments: list[Typed]) -> list[Typed]:
+def _absolute(_: Frame, arguments: list[CExpression]) -> list[CExpression]:
     item = arguments[0]
     low, high = item.range.low, item.range.high
     least = 0 if low <= 0 <= high else min(abs(low), abs(high))
     most = max(abs(low), abs(high))
-    if item.range.kind is Kind.REAL:
-        return [Typed(f"fabs({bare(item.text)})", Range(Kind.REAL, least, most, item.range.never_nan))]
+    if item.range.kind is NumberKind.REAL:
+        return [CExpression(f"fabs({bare(item.text)})", Range(NumberKind.REAL, least, most, item.range.never_nan))]
     width = "wide" if item.range.is_wide else "of"
-    return [Typed(f"magnitude_{width}({bare(item.text)})", Range(Kind.INT, least, most))]
+    return [CExpression(f"magnitude_{width}({bare(item.text)})", Range(NumberKind.INT, least, most))]
 
 
-def _real(_: Frame, arguments: list[Typed]) -> list[Typed]:
+def _real(_: Frame, arguments: list[CExpression]) -> list[CExpression]:
     return [as_real(arguments[0])]
 
 
 def _rounding(carry_out: Callable[[float], int], function: str) -> Carry:
-    def rounded(frame: Frame, arguments: list[Typed]) -> list[Typed]:
+    def rounded(frame: Frame, arguments: list[CExpression]) -> list[CExpression]:
         item = arguments[0]
         if item.range.is_whole:
             return [item.whole]
         if item.range.low < -_MOST or item.range.high > _MOST:
-            known = Range(Kind.INT, -int(_MOST), int(_MOST))
-            return [Typed(f"{function}_wide({bare(item.text)}, {frame.ended()})", known)]
-        result = Range(Kind.INT, carry_out(item.range.low), carry_out(item.range.high))
+            known = Range(NumberKind.INT, -int(_MOST), int(_MOST))
+            return [CExpression(f"{function}_wide({bare(item.text)}, {frame.ended()})", known)]
+        result = Range(NumberKind.INT, carry_out(item.range.low), carry_out(item.range.high))
         wide = "_wide" * result.is_wide
-        return [Typed(f"{function}{wide}({bare(item.text)}, {frame.ended()})", result)]
+        return [CExpression(f"{function}{wide}({bare(item.text)}, {frame.ended()})", result)]
 
     return rounded
 
@@ -197,36 +197,36 @@ def _least_or_most(*, least: bool) -> Carry:
 def _of_library(name: str, low: float = -INFINITE, high: float = INFINITE, result: Range = ANY_REAL) -> Carry:
     """Return the translation to a function of the C library, for arguments within bounds where Python never raises."""
 
-    def library(frame: Frame, arguments: list[Typed]) -> list[Typed]:
+    def library(frame: Frame, arguments: list[CExpression]) -> list[CExpression]:
         item = as_real(arguments[0])
         text = bare(item.text)
         if item.range.low < low or item.range.high > high:
             text = f"within({text}, {low!r}, {high!r}, {frame.ended()})".replace("inf", "INFINITY")
-        return [Typed(f"{name}({text})", result)]
+        return [CExpression(f"{name}({text})", result)]
 
     return library
 
 
 def _asking(name: str) -> Carry:
-    return lambda _, arguments: [Typed(f"(bool){name}({bare(as_real(arguments[0]).text)})", ANY_BOOL)]
+    return lambda _, arguments: [CExpression(f"(bool){name}({bare(as_real(arguments[0]).text)})", ANY_BOOL)]
 
 
-def _truth(_: Frame, arguments: list[Typed]) -> list[Typed]:
-    return [Typed(f"({arguments[0].text} != 0)", ANY_BOOL)]
+def _truth(_: Frame, arguments: list[CExpression]) -> list[CExpression]:
+    return [CExpression(f"({arguments[0].text} != 0)", ANY_BOOL)]
 
 
-def _stored_real(frame: Frame, arguments: list[Typed]) -> list[Typed]:
+def _stored_real(frame: Frame, arguments: list[CExpression]) -> list[CExpression]:
     item = as_real(arguments[0])
     stored = [
         stored_real(bound)[0] if abs(bound) != INFINITE else math.copysign(REAL_MAX, bound)
         for bound in (item.range.low, item.range.high)
     ]
     # NaN becomes 0
-    result = Range(Kind.REAL, min(0.0, stored[0]), max(0.0, stored[1]), never_nan=True)
+    result = Range(NumberKind.REAL, min(0.0, stored[0]), max(0.0, stored[1]), never_nan=True)
     return _deliver(frame, "stored_real", [bare(item.text)], [result, ANY_BOOL], can_end=False)
 
 
-def _data_value(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
+def _data_value(frame: Frame, node: ast.Call, known: Environment) -> list[CExpression]:
     """Return READ of a DATA value: the result of each value for a variable of the type is known."""
     item, suffix, limit = node.args
     data = frame.scope["data"]
@@ -237,21 +237,21 @@ def _data_value(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]
     return [frame.constants([result[place] for result in read], item.slice, known) for place in (0, 1)]
 
 
-def _integer_power(frame: Frame, arguments: list[Typed]) -> list[Typed]:
+def _integer_power(frame: Frame, arguments: list[CExpression]) -> list[CExpression]:
     texts = [bare(item.whole.text) for item in arguments]
-    results = [Range(Kind.INT, INT32_MIN, INT32_MAX), Range(Kind.INT, 0, functions.DIVISION_BY_ZERO)]
+    results = [Range(NumberKind.INT, INT32_MIN, INT32_MAX), Range(NumberKind.INT, 0, functions.DIVISION_BY_ZERO)]
     return _deliver(frame, "integer_power", texts, results, can_end=False)
 
 
-def _real_power(frame: Frame, arguments: list[Typed]) -> list[Typed]:
+def _real_power(frame: Frame, arguments: list[CExpression]) -> list[CExpression]:
     texts = [bare(as_real(item).text) for item in arguments]
-    results = [ANY_REAL, Range(Kind.INT, 0, functions.BAD_ARGUMENT)]
+    results = [ANY_REAL, Range(NumberKind.INT, 0, functions.BAD_ARGUMENT)]
     return _deliver(frame, "real_power", texts, results, can_end=False)
 
 
-def _call_raised(frame: Frame, arguments: list[Typed]) -> list[Typed]:
+def _call_raised(frame: Frame, arguments: list[CExpression]) -> list[CExpression]:
     base, exponent = (bare(as_real(item).text) for item in arguments)
-    return [Typed(f"raised({base}, {exponent}, {frame.ended()})", ANY_REAL)]
+    return [CExpression(f"raised({base}, {exponent}, {frame.ended()})", ANY_REAL)]
 
 
 _BUILTINS: dict[object, Carry] = {
@@ -264,13 +264,13 @@ _BUILTINS: dict[object, Carry] = {
     math.floor: _rounding(math.floor, "floored"),
     math.isnan: _asking("isnan"),
     math.isfinite: _asking("isfinite"),
-    math.sqrt: _of_library("sqrt", 0.0, result=Range(Kind.REAL, 0.0, INFINITE)),
-    math.sin: _of_library("library_sin", result=Range(Kind.REAL, -1.0, 1.0)),
-    math.cos: _of_library("library_cos", result=Range(Kind.REAL, -1.0, 1.0)),
+    math.sqrt: _of_library("sqrt", 0.0, result=Range(NumberKind.REAL, 0.0, INFINITE)),
+    math.sin: _of_library("library_sin", result=Range(NumberKind.REAL, -1.0, 1.0)),
+    math.cos: _of_library("library_cos", result=Range(NumberKind.REAL, -1.0, 1.0)),
     math.tan: _of_library("library_tan"),
-    math.atan: _of_library("library_atan", result=Range(Kind.REAL, -2.0, 2.0)),
+    math.atan: _of_library("library_atan", result=Range(NumberKind.REAL, -2.0, 2.0)),
     math.log: _of_library("library_log", 5e-324),
-    math.exp: _of_library("library_exp", high=709.0, result=Range(Kind.REAL, 0.0, INFINITE)),
+    math.exp: _of_library("library_exp", high=709.0, result=Range(NumberKind.REAL, 0.0, INFINITE)),
     stored_real: _stored_real,
     functions.store_real: _stored_real,
     functions.integer_power: _integer_power,

@@ -12,15 +12,15 @@ from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.blocks.coefficients import CoefficientFunction
 from automax_ros.compile.native.translate import expressions, refinement
 from automax_ros.compile.native.translate.environment import Environment
-from automax_ros.compile.native.translate.ranges import Kind, Range, span
-from automax_ros.compile.native.translate.typed import WIDE, Typed, bare, c_type, literal, whole_text
+from automax_ros.compile.native.translate.ranges import NumberKind, Range, span
+from automax_ros.compile.native.translate.typed import WIDE, CExpression, bare, c_type, literal, whole_text
 
 _PINNED_FROM, _PINNED = 2**33, 2**40
 """A block's integer whose range keeps growing past the first is assumed to stay within the second (decision): no block
 of the manual keeps more than 32 bits. The code checks it, and ends the scan with an error where it is not true."""
-Member = Callable[["Frame", ast.Call, Environment], list[Typed]]
+Member = Callable[["Frame", ast.Call, Environment], list[CExpression]]
 """Translates a call of ``io``."""
-Caller = Callable[["Frame", object, ast.Call, Environment], list[Typed]]
+Caller = Callable[["Frame", object, ast.Call, Environment], list[CExpression]]
 """Translates a call of a Python function."""
 
 
@@ -43,7 +43,7 @@ class Unit:
             self._trees[key] = make(function)
         return self._trees[key]
 
-    def table(self, items: Sequence[Typed], place: str, known: Range) -> Typed:
+    def table(self, items: Sequence[CExpression], place: str, known: Range) -> CExpression:
         """Return an element of a table of constants, at an index that is inside."""
         body = f"[] = {{{', '.join(item.text for item in items)}}};"
         key = f"static const {c_type(known)} {body}"
@@ -51,7 +51,7 @@ class Unit:
         if name is None:
             name = self._tables[key] = f"table_{len(self._tables) + 1}"
             self.parts.append(f"static const {c_type(known)} {name}{body}")
-        return Typed(f"{name}[{place}]", known)
+        return CExpression(f"{name}[{place}]", known)
 
     def function(self, name: str, head: str, body: str) -> str:
         """Return the name in C of a function; ``head`` and ``body`` have ``@`` in place of the name."""
@@ -89,7 +89,7 @@ class Frame:
     caller: Caller
     members: Mapping[str, Member] = field(default_factory=dict)
     fields: dict[str, str] = field(default_factory=dict)
-    field_kinds: dict[str, Kind] = field(default_factory=dict)
+    field_kinds: dict[str, NumberKind] = field(default_factory=dict)
     arrays: dict[str, Array] = field(default_factory=dict)
     tuples: dict[str, list[object]] = field(default_factory=dict)
     declared: dict[str, Range] = field(default_factory=dict)
@@ -105,7 +105,7 @@ class Frame:
     depth: int = 1
     loops: dict[int, Environment] = field(default_factory=dict)
     temporaries: int = 0
-    _kinds: dict[str, dict[Kind, str]] = field(default_factory=dict)
+    _kinds: dict[str, dict[NumberKind, str]] = field(default_factory=dict)
     _wide: set[str] = field(default_factory=set)
 
     def emit(self, text: str) -> None:
@@ -142,7 +142,7 @@ class Frame:
 
     # Names
 
-    def store(self, name: str, item: Typed, known: Environment) -> None:
+    def store(self, name: str, item: CExpression, known: Environment) -> None:
         """Emit the store of a value into a variable."""
         kind = item.range.kind
         c_type(item.range)
@@ -184,7 +184,7 @@ class Frame:
         self.locals[name] = c_type(known)
         return name
 
-    def read(self, name: str, known: Environment) -> Typed:
+    def read(self, name: str, known: Environment) -> CExpression:
         """Return a variable, or a constant of the module."""
         present = known.get(name)
         if present is None:
@@ -193,10 +193,10 @@ class Frame:
             raise NotNative(f"{name} may have no value")
         c_type(present)
         only = present.only
-        if only is not None and present.kind is Kind.BOOL:
-            return Typed("true" if only else "false", present)
+        if only is not None and present.kind is NumberKind.BOOL:
+            return CExpression("true" if only else "false", present)
         place = self._place(name, present)
-        return Typed(f"(int64_t){place}" if place in self._wide and not present.is_wide else place, present)
+        return CExpression(f"(int64_t){place}" if place in self._wide and not present.is_wide else place, present)
 
     def attribute(self, node: ast.Attribute) -> object:
         """Return a constant of a module, such as ``math.pi``."""
@@ -205,21 +205,21 @@ class Frame:
             raise NotNative(f"a member {node.attr}")
         return getattr(base, node.attr)
 
-    def element(self, name: str, index: ast.expr, known: Environment) -> Typed:
+    def element(self, name: str, index: ast.expr, known: Environment) -> CExpression:
         """Return an element of an array or of a named tuple of constants."""
         if name in self.tuples:
             return self.constants(self.tuples[name], index, known)
         array = self.arrays.get(name)
         if array is None:
             raise NotNative(f"an element of {name}")
-        return Typed(f"{array.place}[{bare(self.place_in(array.size, index, known))}]", known[name])
+        return CExpression(f"{array.place}[{bare(self.place_in(array.size, index, known))}]", known[name])
 
     def pinned(self, name: str, known: Range) -> Range:
         """Return the assumed range of a field whose range keeps growing: a block's integer has bounds."""
         if name not in self.fields and name not in self.arrays:
             return known
-        if known.kind is Kind.INT and max(-known.low, known.high) > _PINNED_FROM:
-            return self.declared.setdefault(name, Range(Kind.INT, -_PINNED, _PINNED))
+        if known.kind is NumberKind.INT and max(-known.low, known.high) > _PINNED_FROM:
+            return self.declared.setdefault(name, Range(NumberKind.INT, -_PINNED, _PINNED))
         return known
 
     def place_in(self, size: int, index: ast.expr, known: Environment) -> str:
@@ -227,28 +227,28 @@ class Frame:
 
         So neither a fault of a proof nor a value from outside can reach memory outside the array.
         """
-        place, inside = self.value(index, known).whole, Range(Kind.INT, 0, size - 1)
+        place, inside = self.value(index, known).whole, Range(NumberKind.INT, 0, size - 1)
         if isinstance(index, ast.Constant):
             return self.held(place, inside).text
         return self._asked_to_lie_in(place, inside).text
 
-    def held(self, item: Typed, declared: Range | None) -> Typed:
+    def held(self, item: CExpression, declared: Range | None) -> CExpression:
         """Return a value that is within a range: where that cannot be proved, the scan ends if it is not."""
         if declared is None or declared.holds(item.range):
             return item
         return self._asked_to_lie_in(item, declared)
 
-    def _asked_to_lie_in(self, item: Typed, declared: Range) -> Typed:
-        if item.range.kind is not declared.kind or declared.kind is not Kind.INT:
+    def _asked_to_lie_in(self, item: CExpression, declared: Range) -> CExpression:
+        if item.range.kind is not declared.kind or declared.kind is not NumberKind.INT:
             raise NotNative("a value of another kind than that of its variable")
         low, high = max(item.range.low, declared.low), min(item.range.high, declared.high)
         if low > high:
             low, high = declared.low, declared.high
         bounds = f"{whole_text(int(declared.low))}, {whole_text(int(declared.high))}"
         wide = "_wide" * item.range.is_wide
-        return Typed(f"held{wide}({bare(item.text)}, {bounds}, {self.ended()})", Range(Kind.INT, low, high))
+        return CExpression(f"held{wide}({bare(item.text)}, {bounds}, {self.ended()})", Range(NumberKind.INT, low, high))
 
-    def constants(self, values: Sequence[object], index: ast.expr, known: Environment) -> Typed:
+    def constants(self, values: Sequence[object], index: ast.expr, known: Environment) -> CExpression:
         """Return an element of a tuple of constants."""
         items = [literal(value) for value in values]
         place = self.place_in(len(items), index, known)
@@ -256,7 +256,7 @@ class Frame:
 
     # Expressions
 
-    def value(self, node: ast.expr, known: Environment) -> Typed:
+    def value(self, node: ast.expr, known: Environment) -> CExpression:
         """Return an expression in C."""
         return expressions.value(self, node, known)
 
@@ -264,7 +264,7 @@ class Frame:
         """Return the known ranges where a test has the result ``truth``; None where it cannot."""
         return refinement.refined(self, test, known, truth=truth)
 
-    def call(self, node: ast.Call, known: Environment) -> list[Typed]:
+    def call(self, node: ast.Call, known: Environment) -> list[CExpression]:
         """Return the results of a call."""
         function = node.func
         if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):

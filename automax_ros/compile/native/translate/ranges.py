@@ -15,7 +15,7 @@ from automax_ros.core.numbers import REAL_LIMIT
 from automax_ros.core.types import DataType
 
 
-class Kind(enum.Enum):
+class NumberKind(enum.Enum):
     """The Python type of a value; ``c_type`` is the type in C."""
 
     BOOL = "bool"
@@ -26,7 +26,7 @@ class Kind(enum.Enum):
         self.c_type = c_type
 
 
-_BOOL, _INT, _REAL = Kind
+_BOOL, _INT, _REAL = NumberKind
 """Module names: an enumeration's member is slow to read, and a long task reads them some million times."""
 INT64_MAX = 2**63 - 1
 EXACT_IN_DOUBLE = 2**53
@@ -41,7 +41,7 @@ class Range:
     ``never_nan`` says that a REAL cannot be NaN.
     """
 
-    kind: Kind | None
+    kind: NumberKind | None
     low: float
     high: float
     never_nan: bool = False
@@ -86,16 +86,16 @@ class Range:
     def widened(self, new: Range) -> Range:
         """Return a range that contains both, with bounds that move in few steps only, so that loops converge."""
         both = self.joined(new)
-        if both == self or both.kind is None or both.kind is Kind.BOOL:
+        if both == self or both.kind is None or both.kind is NumberKind.BOOL:
             return both
-        steps = _REAL_STEPS if both.kind is Kind.REAL else _INTEGER_STEPS
+        steps = _REAL_STEPS if both.kind is NumberKind.REAL else _INTEGER_STEPS
         low = self.low if both.low >= self.low else -_reaching(steps, -both.low)
         high = self.high if both.high <= self.high else _reaching(steps, both.high)
         return Range(both.kind, low, high, both.never_nan)
 
 
-ANY_REAL = Range(Kind.REAL, -INFINITE, INFINITE)
-ANY_BOOL = Range(Kind.BOOL, 0, 1)
+ANY_REAL = Range(NumberKind.REAL, -INFINITE, INFINITE)
+ANY_BOOL = Range(NumberKind.BOOL, 0, 1)
 
 _INTEGER_STEPS: tuple[float, ...] = (0, 1, 32768, 2**31 - 1, 2**31, 2**33, 2**40, 2**53, 2**62, 2**100, INFINITE)
 _REAL_STEPS: tuple[float, ...] = (
@@ -123,13 +123,13 @@ def of_type(kind: DataType) -> Range:
     if kind is DataType.REAL:
         return ANY_REAL
     low, high = kind.range
-    return Range(Kind.INT, int(low), int(high))
+    return Range(NumberKind.INT, int(low), int(high))
 
 
 def corners(left: Range, right: Range, operation: Callable[[float, float], float], *, real: bool) -> Range:
     """Return the range of an operation that is monotonic in each of its operands."""
     pairs = [(a, b) for a in (left.low, left.high) for b in (right.low, right.high)]
-    kind = Kind.REAL if real else Kind.INT
+    kind = NumberKind.REAL if real else NumberKind.INT
     try:
         results = [operation(float(a), float(b)) if real else operation(a, b) for a, b in pairs]
     except (OverflowError, ZeroDivisionError):

@@ -16,9 +16,9 @@ from automax_ros.compile.base.emitter import variable_name
 from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.native.translate.environment import Environment
 from automax_ros.compile.native.translate.frame import Frame
-from automax_ros.compile.native.translate.ranges import ANY_BOOL, Kind, Range
+from automax_ros.compile.native.translate.ranges import ANY_BOOL, NumberKind, Range
 from automax_ros.compile.native.translate.statements import Body
-from automax_ros.compile.native.translate.typed import Typed, bare
+from automax_ros.compile.native.translate.typed import CExpression, bare
 
 CarryOut = Callable[[ast.stmt, Environment], Environment | None]
 
@@ -131,20 +131,22 @@ class ScanBody(Body):
         known = known.copy()
         for place, (name, item) in enumerate(zip(names, self._latched, strict=True)):
             slot = f"latched[{place}][k]"
-            text = {Kind.INT: f"{slot}.i", Kind.BOOL: f"({slot}.i != 0)", Kind.REAL: f"{slot}.d"}[_kind(item)]
-            self.frame.store(name, Typed(text, item), known)
+            text = {NumberKind.INT: f"{slot}.i", NumberKind.BOOL: f"({slot}.i != 0)", NumberKind.REAL: f"{slot}.d"}[
+                _kind(item)
+            ]
+            self.frame.store(name, CExpression(text, item), known)
         return known
 
     def _forces(self, names: list[str], known: Environment) -> Environment:
         known = known.copy()
         for place, name in enumerate(names):
-            self.frame.store(name, Typed(f"(forced[{place}] != 0)", ANY_BOOL), known)
+            self.frame.store(name, CExpression(f"(forced[{place}] != 0)", ANY_BOOL), known)
         return known
 
     def _give_out(self, known: Environment) -> Environment:
         for place, name in enumerate(self._written):
             item = self.frame.read(variable_name(name), known)
-            member = "d" if item.range.kind is Kind.REAL else "i"
+            member = "d" if item.range.kind is NumberKind.REAL else "i"
             self.frame.emit(f"out[{place}][k].{member} = {bare(item.text)};")
         return known
 
@@ -170,7 +172,7 @@ class ScanBody(Body):
     }
 
 
-def _kind(item: Range) -> Kind:
+def _kind(item: Range) -> NumberKind:
     assert item.kind is not None
     return item.kind
 

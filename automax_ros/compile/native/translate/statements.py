@@ -15,7 +15,7 @@ from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.native.translate.environment import Environment, joined
 from automax_ros.compile.native.translate.frame import Frame
 from automax_ros.compile.native.translate.ranges import Range
-from automax_ros.compile.native.translate.typed import Typed, bare, c_type, whole_text
+from automax_ros.compile.native.translate.typed import CExpression, bare, c_type, whole_text
 
 _PASSING = re.compile(r"(b\d+_\w+|t\d+|over|dropped)$")
 """Locals of one block or statement."""
@@ -122,13 +122,13 @@ class Body:
         for target, result in zip(targets.elts, results, strict=True):
             self._assign_one(target, result, known)
 
-    def _keep(self, item: Typed) -> Typed:
+    def _keep(self, item: CExpression) -> CExpression:
         """Return a value in a separate local: names in it are about to change."""
         name = self.frame.temporary(item.range)
         self.frame.emit(f"{name} = {bare(item.text)};")
-        return Typed(name, item.range)
+        return CExpression(name, item.range)
 
-    def _assign_one(self, target: ast.expr, item: Typed, known: Environment) -> None:
+    def _assign_one(self, target: ast.expr, item: CExpression, known: Environment) -> None:
         if item.mixed:
             raise NotNative("a value that is an integer or a REAL, as it happens")
         if isinstance(target, ast.Name):
@@ -276,7 +276,7 @@ class Body:
         nodes = value.elts if isinstance(value, ast.Tuple) else [value]
         self._deliver([self.frame.value(node, known) for node in nodes if node is not None])
 
-    def _deliver(self, results: list[Typed]) -> None:
+    def _deliver(self, results: list[CExpression]) -> None:
         for number, item in enumerate(results[1:], 1):
             self.frame.emit(f"*result_{number} = {bare(item.text)};")
         self.frame.emit(f"return {bare(results[0].text)};")

@@ -15,13 +15,13 @@ from importlib.resources import files
 from automax_ros.compile.base.build import collections_paused
 from automax_ros.compile.base.emitter import variable_name
 from automax_ros.compile.base.layout import Layout, Role, StateField
-from automax_ros.compile.base.native_source import Form, NativeSource, NotNative
+from automax_ros.compile.base.native_source import NativeSource, NotNative, TaskFunction
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.native.translate.calls import called
 from automax_ros.compile.native.translate.environment import Environment
 from automax_ros.compile.native.translate.frame import Array, Frame, Unit
 from automax_ros.compile.native.translate.members import members
-from automax_ros.compile.native.translate.ranges import INFINITE, Kind, Range, exactly, of_type
+from automax_ros.compile.native.translate.ranges import INFINITE, NumberKind, Range, exactly, of_type
 from automax_ros.compile.native.translate.scan_body import ScanBody, scan_of, state_names
 from automax_ros.compile.native.translate.typed import whole_text
 from automax_ros.core.types import DataType, type_of_name
@@ -43,7 +43,7 @@ def translate(compiled: CompiledTask) -> NativeSource:
     return translated(compiled, scans_of(compiled))
 
 
-def scans_of(compiled: CompiledTask) -> Form:
+def scans_of(compiled: CompiledTask) -> TaskFunction:
     """Return the form of a task's scans that is translated.
 
     Raises:
@@ -59,7 +59,7 @@ def scans_of(compiled: CompiledTask) -> Form:
     return compiled.form("scans_forced")
 
 
-def translated(compiled: CompiledTask, form: Form) -> NativeSource:
+def translated(compiled: CompiledTask, form: TaskFunction) -> NativeSource:
     """Return the C of scans in the form that ``scans_of`` returns.
 
     Raises:
@@ -78,7 +78,7 @@ def fixed_parts() -> tuple[str, ...]:
 
 
 class _Translation:
-    def __init__(self, compiled: CompiledTask, form: Form) -> None:
+    def __init__(self, compiled: CompiledTask, form: TaskFunction) -> None:
         self._compiled, self._layout = compiled, compiled.layout
         tuples, self._statements = scan_of(form.function)
         types = {view: type_of_name(name) for name, view in form.views.items()}
@@ -95,7 +95,7 @@ class _Translation:
             arrays={name: Array(f"s->{name}", field.size) for name, field in fields.items() if field.is_array},
             tuples=tuples,
             declared={
-                **{name: Range(Kind.INT, 0, field.below - 1) for name, field in fields.items() if field.below},
+                **{name: Range(NumberKind.INT, 0, field.below - 1) for name, field in fields.items() if field.below},
                 **{
                     variable_name(name): of_type(symbol.type)
                     for name, symbol in compiled.program.symbols.items()
@@ -176,12 +176,12 @@ def _at_first(field: StateField) -> Range:
         return of_type(field.type)
     assert not isinstance(field.initial, str)
     if field.below:
-        return Range(Kind.INT, 0, field.below - 1)
+        return Range(NumberKind.INT, 0, field.below - 1)
     return exactly(field.initial)
 
 
 def _limits_of(known: Range) -> tuple[int, int]:
-    return (0, 0) if known.kind is Kind.REAL else (int(known.low), int(known.high))
+    return (0, 0) if known.kind is NumberKind.REAL else (int(known.low), int(known.high))
 
 
 @cache

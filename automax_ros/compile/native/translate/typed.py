@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, replace
 
 from automax_ros.compile.base.native_source import NotNative
-from automax_ros.compile.native.translate.ranges import INT64_MAX, Kind, Range, exactly
+from automax_ros.compile.native.translate.ranges import INT64_MAX, NumberKind, Range, exactly
 
 WIDE = "__int128"
 INT128_MAX = 2**127 - 1
@@ -15,7 +15,7 @@ _PARENTHESES = re.compile("[()]")
 
 
 @dataclass(frozen=True, slots=True)
-class Typed:
+class CExpression:
     """A C expression without effects, usable as any operand, and the range of its value.
 
     A ``mixed`` one is in Python an integer or a REAL, depending on the values; as a REAL it is the same number.
@@ -26,31 +26,31 @@ class Typed:
     mixed: bool = False
 
     @property
-    def whole(self) -> Typed:
+    def whole(self) -> CExpression:
         """The same as an integer operand: a boolean counts as 0 and 1."""
-        if self.range.kind is Kind.INT:
+        if self.range.kind is NumberKind.INT:
             return self
-        return replace(self, text=f"(int64_t){self.text}", range=replace(self.range, kind=Kind.INT))
+        return replace(self, text=f"(int64_t){self.text}", range=replace(self.range, kind=NumberKind.INT))
 
     @property
     def signed(self) -> str:
         """The text of an integer in 64 bits or more: in C a literal, or a boolean, has 32."""
         is_literal = self.text.strip("(-)").isdigit()
-        return f"(int64_t){self.text}" if is_literal or self.range.kind is Kind.BOOL else self.text
+        return f"(int64_t){self.text}" if is_literal or self.range.kind is NumberKind.BOOL else self.text
 
 
-def literal(value: object) -> Typed:
+def literal(value: object) -> CExpression:
     """Return a Python literal.
 
     Raises:
         NotNative: it is not a number or boolean.
     """
     if isinstance(value, bool):
-        return Typed("true" if value else "false", exactly(value))
+        return CExpression("true" if value else "false", exactly(value))
     if isinstance(value, int):
-        return Typed(whole_text(value), exactly(value))
+        return CExpression(whole_text(value), exactly(value))
     if isinstance(value, float):
-        return Typed(real_text(value), exactly(value))
+        return CExpression(real_text(value), exactly(value))
     raise NotNative("a string" if isinstance(value, str) else f"a value {value!r}")
 
 
@@ -85,15 +85,15 @@ def c_type(known: Range) -> str:
     return WIDE
 
 
-def as_real(value: Typed) -> Typed:
+def as_real(value: CExpression) -> CExpression:
     """Return a value as an operand of Python's arithmetic with a REAL."""
-    if value.range.kind is Kind.REAL:
+    if value.range.kind is NumberKind.REAL:
         return value
     low, high = float(value.range.low), float(value.range.high)
-    return Typed(f"(double){value.text}", Range(Kind.REAL, low, high, never_nan=True))
+    return CExpression(f"(double){value.text}", Range(NumberKind.REAL, low, high, never_nan=True))
 
 
-def widened(value: Typed) -> str:
+def widened(value: CExpression) -> str:
     """Return an integer's text in 128 bits."""
     return value.text if value.range.is_wide else f"({WIDE}){value.text}"
 

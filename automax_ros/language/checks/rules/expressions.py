@@ -25,7 +25,7 @@ from automax_ros.language.checks.rules.typing_rules import (
 )
 from automax_ros.language.program import Symbol
 from automax_ros.language.tree import tree
-from automax_ros.language.tree.functions import FUNCTIONS, Argument, Function, Result
+from automax_ros.language.tree.functions import FUNCTIONS, ArgumentKind, Function, Result
 
 _SMALLEST = 5e-324
 _BITS = (1, 0, 15, "bits 0 to 15")
@@ -43,7 +43,11 @@ _RANGES: dict[str, tuple[int, float, float, str]] = {
     "ROTATER%": _PLACES,
 }
 """Functions with a limited argument: its place, its limits, and these in words (see ``tree/functions``)."""
-_WORDS = {Argument.NUMBER: "a number", Argument.INTEGER: "an integer", Argument.STRING: "a string"}
+_WORDS = {
+    ArgumentKind.NUMBER: "a number",
+    ArgumentKind.INTEGER: "an integer",
+    ArgumentKind.STRING: "a string",
+}
 _HEXADECIMAL = re.compile(r"[A-F][0-9A-F]{0,7}H")
 """A name that looks like a hexadecimal constant without its leading 0."""
 _LITERAL_TYPES: dict[type, DataType] = {
@@ -75,10 +79,10 @@ def check_function(context: Context, call: tree.FunctionCall, types: list[DataTy
     return function.result.of(tuple(kind for kind in types if kind is not None))
 
 
-def _takes(wanted: Argument, kind: DataType) -> bool:
-    if wanted is Argument.STRING:
+def _takes(wanted: ArgumentKind, kind: DataType) -> bool:
+    if wanted is ArgumentKind.STRING:
         return kind is DataType.STRING
-    return kind.is_integer if wanted is Argument.INTEGER else kind.is_numeric
+    return kind.is_integer if wanted is ArgumentKind.INTEGER else kind.is_numeric
 
 
 def _check_range(context: Context, call: tree.FunctionCall, argument: tree.Expression) -> None:

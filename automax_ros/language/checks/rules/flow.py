@@ -24,7 +24,7 @@ class Region(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Place:
+class LinePlace:
     """The place of a statement: ``blocks`` are the IF and FOR bodies around it, outermost first."""
 
     region: Region
@@ -37,7 +37,7 @@ class Jump:
     """A line to which a statement may jump."""
 
     line: int
-    place: Place
+    place: LinePlace
     number: int | None
     verb: str
 
@@ -62,16 +62,16 @@ def check_flow(context: Context, layout: TaskLayout) -> None:
         _check_reached(context, _up_to_end(layout.scan), targets, layout.scan_loop_line)
 
 
-def _collect(layout: TaskLayout) -> tuple[dict[int, Place], list[Jump]]:
-    places: dict[int, Place] = {}
+def _collect(layout: TaskLayout) -> tuple[dict[int, LinePlace], list[Jump]]:
+    places: dict[int, LinePlace] = {}
     jumps: list[Jump] = []
     if layout.scan_loop is not None and layout.scan_loop_line is not None:
-        places[layout.scan_loop_line] = Place(Region.LOOP, (), layout.scan_loop)
+        places[layout.scan_loop_line] = LinePlace(Region.LOOP, (), layout.scan_loop)
     parts = ((Region.STARTUP, layout.startup, None), (Region.SCAN, layout.scan, layout.scan_loop_line))
     for region, part, first_line in parts:
         line = first_line
         for statement, blocks in _place_statements(part, ()):
-            place = Place(region, blocks, statement)
+            place = LinePlace(region, blocks, statement)
             if statement.number is not None:
                 line = statement.number
                 places.setdefault(line, place)
@@ -101,7 +101,7 @@ def _targets(statement: tree.Statement) -> list[tuple[int, str]]:
     return [(line, "EMPTY =") for line in jumps_of(statement)]
 
 
-def _check_jump(context: Context, jump: Jump, places: dict[int, Place]) -> None:
+def _check_jump(context: Context, jump: Jump, places: dict[int, LinePlace]) -> None:
     span = context.place_of(str(jump.line), jump.place.statement.span)
     place = places.get(jump.line)
     if place is None:
@@ -129,7 +129,7 @@ def _ends_at_scan_loop(jump: Jump) -> bool:
     return not jump.verb.endswith("GOSUB") or jump.place.region is Region.SCAN
 
 
-def _near_line(line: int, places: dict[int, Place]) -> str | None:
+def _near_line(line: int, places: dict[int, LinePlace]) -> str | None:
     following = min((number for number in places if number > line), default=None)
     return None if following is None else f"the next line is {following}"
 
@@ -146,7 +146,7 @@ def _check_returns(context: Context, layout: TaskLayout) -> None:
             context.report("AMX4055", "RETURN in a task without GOSUB", statement.span)
 
 
-def _check_restores(context: Context, layout: TaskLayout, places: dict[int, Place]) -> None:
+def _check_restores(context: Context, layout: TaskLayout, places: dict[int, LinePlace]) -> None:
     data = [line or 0 for line, _ in context.data]
     for statement, line, _ in layout.numbered():
         if not isinstance(statement, tree.Restore) or "DATA" in context.broken.words:

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from automax_ros.compile.native.translate import environment
 from automax_ros.compile.native.translate.environment import Environment, joined
-from automax_ros.compile.native.translate.ranges import Kind, Range
+from automax_ros.compile.native.translate.ranges import NumberKind, Range
 
 NAMES = "abcdefgh"
 Model = dict[str, Range]
-ranges = st.builds(lambda low, size: Range(Kind.INT, low, low + size), st.integers(-3, 3), st.integers(0, 3))
+ranges = st.builds(lambda low, size: Range(NumberKind.INT, low, low + size), st.integers(-3, 3), st.integers(0, 3))
 steps = st.lists(
     st.tuples(
         st.sampled_from(["set", "drop", "fork", "join", "read"]),
@@ -27,7 +27,7 @@ steps = st.lists(
 def met(first: Model, second: Model) -> Model:
     """What plain dictionaries say of two paths that meet."""
     return {
-        name: Range(Kind.INT, min(item.low, second[name].low), max(item.high, second[name].high))
+        name: Range(NumberKind.INT, min(item.low, second[name].low), max(item.high, second[name].high))
         for name, item in first.items()
         if name in second
     }
@@ -70,6 +70,6 @@ def test_it_knows_what_dictionaries_know(base: Model, actions: list, most: int) 
 
 
 def test_where_no_path_comes_from_nothing_is_known() -> None:
-    known = Environment({"a": Range(Kind.INT, 0, 1)})
+    known = Environment({"a": Range(NumberKind.INT, 0, 1)})
     assert joined(None, None) is None
     assert joined(known, None) is joined(None, known) is known

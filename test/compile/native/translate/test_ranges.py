@@ -9,7 +9,7 @@ import pytest
 from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.native.run.cache import NativeCache
 from automax_ros.compile.native.run.task import native_form
-from automax_ros.compile.native.translate.ranges import INFINITE, Kind, Range
+from automax_ros.compile.native.translate.ranges import INFINITE, NumberKind, Range
 from automax_ros.compile.native.translate.translation import translate
 from compile.native.identity import assert_same
 from compile.support import compiled_of, lines
@@ -62,12 +62,12 @@ def test_loops_from_below_zero_take_the_turns_that_they_take_in_python(tmp_path)
     assert state[1][:7] == [-55, -7, -19376, -60004, -5, 2, 0]
 
 
-@pytest.mark.parametrize("kind", [Kind.INT, Kind.REAL])
-def test_a_range_that_is_widened_holds_both_and_comes_to_an_end(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", [NumberKind.INT, NumberKind.REAL])
+def test_a_range_that_is_widened_holds_both_and_comes_to_an_end(kind: NumberKind) -> None:
     bounds = [
         sign * value for value in (0, 0.5, 1, 9, 32767, 32768, 40000, 2**31, 2**60, 1e200, INFINITE) for sign in (-1, 1)
     ]
-    bounds = sorted(bound for bound in bounds if kind is Kind.REAL or bound % 1 != 0.5)
+    bounds = sorted(bound for bound in bounds if kind is NumberKind.REAL or bound % 1 != 0.5)
     ranges = [Range(kind, low, high) for low in bounds for high in bounds if low <= high]
     for first in ranges:
         for second in ranges:
