@@ -15,6 +15,7 @@ from recordings.mutations import CHANGES, mutants
 from automax_ros.cli.recordings.bag_info import as_data, lines_of
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.rack_files import files_of
 from automax_ros.recordings.info.info import bag_info
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.repair.repairing import RepairReport, repair
@@ -134,7 +135,10 @@ def empty_recording(folder: Path, of: str) -> Path:
     rack = build(folder) if of == "never activated" else build(folder, EMPTY_RACK)
     if of == "nothing":
         facts = {"rack": rack.config.name, "version": "0.1.0", "fingerprint": f"{rack.fingerprint:016x}"}
-        BagWriter(folder / "bag", custom_data=facts).close()
+        writer = BagWriter(folder / "bag", custom_data=facts)
+        for file in files_of(rack):
+            writer.attach(file.name, file.media_type, file.data)
+        writer.close()
         return folder / "bag"
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, folder / "bag")
