@@ -10,9 +10,9 @@ from compile.programs import checked, outside_writes, tasks
 from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
+from rack.helpers import rack_from
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from replay.replays import record, replayed
 
 YAML = """\
@@ -31,11 +31,7 @@ HISTORY = st.lists(outside_writes(), min_size=4, max_size=4)
 def recording(text: str, history, folder: Path) -> Path:
     """The task in a rack of its own, 5 scans long, with writes from outside between its scans."""
     checked(text)
-    (folder / "rack.yaml").write_text(YAML)
-    (folder / "TASK.BLK").write_text(text)
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_from(folder, YAML, TASK=text)
 
     def write(made: Rack, number: int) -> None:
         for name, value in history[number - 1].items() if number else ():

@@ -5,8 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
+from rack.helpers import Told, rack_from
 
 YAML = """\
 rack: LINE1
@@ -52,27 +51,9 @@ common:
 """
 
 
-class Told:
-    def __init__(self):
-        self.operations = []
-
-    def operated(self, operation):
-        self.operations.append(operation)
-
-    def scanned(self, *_):
-        pass
-
-    written = tuned = scanned
-
-
 @pytest.fixture
 def made(tmp_path):
-    (tmp_path / "LINE.BLK").write_text(LINE)
-    (tmp_path / "PLAIN.BLK").write_text(PLAIN)
-    (tmp_path / "rack.yaml").write_text(YAML)
-    result = load(tmp_path / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    rack, told = Rack(result.config), Told()
+    rack, told = rack_from(tmp_path, YAML, LINE=LINE, PLAIN=PLAIN), Told()
     rack.observe(told)
     rack.start()
     return rack, told.operations
@@ -195,11 +176,7 @@ def test_without_power_nothing_is_adjusted(made):
 
 
 def test_the_process_moves_inputs_without_the_racks_power(tmp_path):
-    (tmp_path / "PLAIN.BLK").write_text(PLAIN)
-    (tmp_path / "rack.yaml").write_text(INPUTS)
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_from(tmp_path, INPUTS, PLAIN=PLAIN)
     rack.start()
     rack.operations.power_off()
     rack.adjust.set("DOOR@", True)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from recordings.live_racks import build
 
-from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operator.reloads import ReloadRefused
 from automax_ros.rack.operator.requests import MAX_NAME, MAX_NAMES, MAX_VALUE, OperatorRequests
 from automax_ros.rack.rack import Rack
+from rack.helpers import Told
 
 YAML = """\
 rack: LINE1
@@ -35,19 +34,6 @@ SPEED = """\
 110 CALL SUMMER(INPUT1=REF%, INPUT2=TRIM%, OUTPUT=OUT%)
 120 END
 """
-
-
-class Told:
-    """Notes operations; everything else goes by."""
-
-    def __init__(self) -> None:
-        self.operations: list[Operation] = []
-
-    def operated(self, operation: Operation) -> None:
-        self.operations.append(operation)
-
-    def __getattr__(self, _: str) -> Any:
-        return lambda *_: None
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operator.retention import Restored, Retention, RetentionFault, default_folder
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
+from rack.helpers import Observer
 
 RACK = """\
 rack: KEEP
@@ -115,16 +116,11 @@ def test_restored_values_are_in_the_log_of_writes(folder):
     rack, retention = made(folder)
     writes = []
 
-    class Observer:
+    class Notes(Observer):
         def written(self, entries):
             writes.extend(entry for group in entries for entry in group.entries())
 
-        def scanned(self, *_):
-            pass
-
-        tuned = all_stopped = scanned
-
-    rack.observe(Observer())
+    rack.observe(Notes())
     rack.start(retention.restore().settings)
     last = {(write.view, write.element): write.value for write in writes}
     assert last[rack.memory.view("COUNT%"), 0] == 120

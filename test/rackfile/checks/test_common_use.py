@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
+from rack.helpers import config_at
 
 from automax_ros.rackfile.checks.tasks import check_tasks, forgotten
-from automax_ros.rackfile.loader import load
 
 CONFIG = Path(__file__).parents[3] / "config"
 RACK = """\
@@ -31,8 +31,7 @@ def found(folder: Path, common: str, one: str = "", two: str = "", log: str = ""
         (folder / f"{name}.BLK").write_text(source if declared else source.replace("10 COMMON NONE%\n", ""))
     (folder / "LOG.BAS").write_text(log or "10 LOCAL X%\n20 X% = 1\n30 END\n")
     (folder / "rack.yaml").write_text(RACK + "".join(f"  {line}\n" for line in common.split("; ")))
-    config = load(folder / "rack.yaml").config
-    assert config is not None, load(folder / "rack.yaml").diagnostics
+    config = config_at(folder / "rack.yaml")
     tasks = check_tasks(config)
     assert all(item.result.program is not None for item in tasks), [item.result.diagnostics for item in tasks]
     items = [item for task in tasks for item in task.result.diagnostics] + forgotten(config, tasks)
@@ -120,15 +119,13 @@ def test_one_warning_for_all_commons_that_no_task_uses(tmp_path):
 def test_nothing_is_said_to_be_forgotten_while_a_task_has_errors(tmp_path):
     found(tmp_path, "A%: {}; B%: {}", "A%: OWN% = A%")
     (tmp_path / "TWO.BLK").write_text("10 NONSENSE\n")
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
+    config = config_at(tmp_path / "rack.yaml")
     assert forgotten(config, check_tasks(config)) == []
 
 
 @pytest.mark.parametrize("path", sorted(CONFIG.rglob("rack.yaml")), ids=lambda path: path.parent.name)
 def test_example_racks_are_free_of_them(path):
-    config = load(path).config
-    assert config is not None
+    config = config_at(path)
     tasks = check_tasks(config)
     items = [item for task in tasks for item in task.result.diagnostics] + forgotten(config, tasks)
     assert [item.code for item in items if item.code.startswith("AMX649")] == []

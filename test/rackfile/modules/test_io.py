@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rack.helpers import rack_at
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
@@ -52,9 +53,7 @@ def codes(folder: Path, points: str) -> list[str]:
 
 
 def built(folder: Path, points: str, panel: str) -> Rack:
-    config = load(written(folder, points, panel)).config
-    assert config is not None
-    return Rack(config)
+    return rack_at(written(folder, points, panel))
 
 
 @given(st.lists(st.integers(-32768, 32767), min_size=1, max_size=4))

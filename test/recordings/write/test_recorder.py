@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from mcap.reader import make_reader
+from rack.helpers import config_at
 from replay.reexecution import Reexecution
 from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -15,7 +16,6 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import automax_ros
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.mcap.errors import BagError, RecordingError
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.soundness import verdict_of
@@ -90,8 +90,7 @@ def test_reexecution_notices_another_program(busy, tmp_path, monkeypatch):
 
 
 def test_example_rack_executes_again(tmp_path):
-    config = load(ROOT / "config" / "section_drive" / "rack.yaml").config
-    assert config is not None
+    config = config_at(ROOT / "config" / "section_drive" / "rack.yaml")
     bag = recorded(Rack(config), tmp_path / "bag", seconds=12.0)
     (tmp_path / "again").mkdir()
     outcome = Reexecution(bag, tmp_path / "again").execute()

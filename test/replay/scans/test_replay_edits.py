@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 from compile.programs import DECLARATIONS
+from rack.helpers import Observer, rack_from
 
 from automax_ros.core.names import element_name
 from automax_ros.core.types import Value
-from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.scans.report import Kind
 from automax_ros.runtime.memory.views import WriteGroup
@@ -36,7 +35,7 @@ STATEMENTS = (
 )
 
 
-class AfterScans:
+class AfterScans(Observer):
     """All of common memory behind each scan, bit for bit."""
 
     def __init__(self, rack: Rack) -> None:
@@ -52,15 +51,6 @@ class AfterScans:
                 exact = struct.pack("<d", value) if isinstance(value, float) else value
                 seen[element_name(variable, element)] = exact
         self.values[record.scan] = seen
-
-    def written(self, writes: list[WriteGroup]) -> None:
-        """Writes between scans are in the next scan's memory."""
-
-    def tuned(self, task: Task, now_ns: int) -> None:
-        """No variable changes."""
-
-    def operated(self, operation: Operation) -> None:
-        """No variable changes."""
 
 
 def statements(choice: random.Random) -> list[str]:
@@ -95,11 +85,7 @@ def edit(body: list[str], choice: random.Random) -> list[str]:
 def ran(text: str, history: list[dict[str, int]], folder: Path) -> tuple[Path, dict[int, dict[str, object]]]:
     """Run and record a task, with writes from outside between its scans."""
     folder.mkdir()
-    (folder / "rack.yaml").write_text(YAML)
-    (folder / "TASK.BLK").write_text(text)
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_from(folder, YAML, TASK=text)
     after = AfterScans(rack)
     rack.observe(after)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from rack.helpers import good
+from rack.helpers import Told, good
 
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operator.switches import MOST_CHARACTERS, SwitchOperations
@@ -21,22 +21,6 @@ plants:
   UNWIND: {motor: dc_150hp_500v, load: {speed_rpm: 875}}
   REEL: {motor: dc_10hp_240v}
 """
-
-
-class Told:
-    """The operations that observers are told of."""
-
-    def __init__(self) -> None:
-        self.operations = []
-
-    def operated(self, operation) -> None:
-        self.operations.append(operation)
-
-    def scanned(self, *_) -> None: ...
-
-    def written(self, _) -> None: ...
-
-    def tuned(self, *_) -> None: ...
 
 
 def rack_of(folder: Path) -> tuple[Rack, Told]:
