@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from compile.programs import DECLARATIONS
 from rack.helpers import Observer, rack_from
+from soaking import in_soak
 
 from automax_ros.core.names import element_name
 from automax_ros.core.types import Value
@@ -116,14 +117,9 @@ def check_edit(seed: int) -> bool:
     return bool(expected)
 
 
-def test_edits_differ_where_running_both_differs():
-    assert sum(check_edit(seed) for seed in range(25)) > 5
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(1200)
-def test_edits_differ_where_running_both_differs_long():
-    assert sum(check_edit(seed) for seed in range(100, 1500)) > 400
+@pytest.mark.parametrize(("seeds", "least"), [(range(25), 5), in_soak(range(100, 1500), 400, timeout_s=1200)])
+def test_edits_differ_where_running_both_differs(seeds, least):
+    assert sum(map(check_edit, seeds)) > least
 
 
 def test_a_dropped_write_is_not_read_back_from_the_recording(tmp_path):
