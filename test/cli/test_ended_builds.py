@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from compile.native.support import await_that, begun_compiler_of, has_ended
+from rack.helpers import written_in
 
 from automax_ros.cli.main import main
 
@@ -36,9 +37,7 @@ REPLAY = ("replay", "bag")
 def folder(tmp_path_factory) -> Path:
     """A rack, a table and a recording."""
     made: Path = tmp_path_factory.mktemp("alone")
-    (made / "rack.yaml").write_text(RACK)
-    (made / "LEAD.BLK").write_text(TASK)
-    (made / "SHAPE.BLK").write_text(TASK.replace("12", "13").replace("OUTPUT=OUT%", "OUTPUT=REF%"))
+    written_in(made, RACK, LEAD=TASK, SHAPE=TASK.replace("12", "13").replace("OUTPUT=OUT%", "OUTPUT=REF%"))
     (made / "IN.csv").write_text("REF%\n5\n")
     options = ("--simulated", "--duration", "0.1", "--record", str(made / "bag"), "--native", "off")
     assert main(["run", str(made / "rack.yaml"), *options]) == 0

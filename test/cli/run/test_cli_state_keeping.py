@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from rack.helpers import rack_at
+from rack.helpers import rack_at, written_in
 
 from automax_ros.cli.run.saving import SAVE_PERIOD_NS, SavedState
 from automax_ros.rack.rack import Rack
@@ -28,8 +28,7 @@ TASK = """\
 
 @pytest.fixture
 def folder(tmp_path) -> Path:
-    (tmp_path / "rack.yaml").write_text(RACK)
-    (tmp_path / "T.BLK").write_text(TASK)
+    written_in(tmp_path, RACK, T=TASK)
     return tmp_path
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rack.helpers import rack_at
+from rack.helpers import rack_at, written_in
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
@@ -43,9 +43,7 @@ PANEL = """\
 
 
 def written(folder: Path, points: str, panel: str = "10 CALL SCAN_LOOP(TICKS=1)\n20 END\n") -> Path:
-    (folder / "PANEL.BLK").write_text(panel)
-    (folder / "rack.yaml").write_text(HEAD + points)
-    return folder / "rack.yaml"
+    return written_in(folder, HEAD + points, PANEL=panel)
 
 
 def codes(folder: Path, points: str) -> list[str]:
