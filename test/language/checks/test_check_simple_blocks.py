@@ -109,7 +109,7 @@ MISTAKES = {
         ("MOVE(INPUT1=A%, OUTPUT1=«5»)", "OUTPUT1"),
     ],
     ("an inverted output", "AMX4079"): [("COMPARE(INPUT1=A%, INPUT2=B%, OUTPUT_LES=«-X@»)", "OUTPUT_LES")],
-    ("MAX_INPUT is no power of two less one", "AMX4080"): [
+    ("MAX_INPUT is not a power of two less one", "AMX4080"): [
         (f"FUNCTION(INPUT=A%, MAX_INPUT=«{number}», TABLE1=TWO%, OUTPUT=B%)", "MAX_INPUT")
         for number in (0, -1, 2, 4, 6, 8, 12, 14, 16, 1000, 1024, 32766, -32768, -32767)
     ],
@@ -117,10 +117,10 @@ MISTAKES = {
     ("a wrong MAX_INPUT says nothing of the table", "AMX4080"): [
         (f"FUNCTION(INPUT=A%, MAX_INPUT=«{number}», TABLE1=T%, OUTPUT=B%)", "MAX_INPUT") for number in (0, -1, 12)
     ],
-    ("a MAX_INPUT that is no INTEGER", "AMX2007"): [
+    ("a MAX_INPUT that is not an INTEGER", "AMX2007"): [
         ("FUNCTION(INPUT=A%, MAX_INPUT=«32768», TABLE1=T%, OUTPUT=B%)", "MAX_INPUT")
     ],
-    ("samples that are no INTEGER", "AMX2007"): [
+    ("samples that are not an INTEGER", "AMX2007"): [
         ("RUNNING_AVERAGE(REQUIRED_SAMPLES=«32768», INPUT=A%, OUTPUT=B%)", "REQUIRED_SAMPLES"),
         ("SAMPLED_AVERAGE(REQUIRED_SAMPLES=«32768», INPUT=A%, OUTPUT=B%)", "REQUIRED_SAMPLES"),
     ],
