@@ -6,8 +6,9 @@ import json
 import re
 
 import pytest
-from rack.drives.drive_tasks import CML, SPEED, YAML, edited, folder_of, permit, rack_of, running
+from rack.drives.drive_tasks import CML, SPEED, YAML, folder_of, permit, rack_of, running
 from rack.helpers import rack_at
+from replay.replays import edited
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from rack.drives.drive_tasks import CML, YAML, edited, folder_of
+from rack.drives.drive_tasks import CML, YAML, folder_of
 from rack.helpers import config_at
+from replay.replays import edited
 
 from automax_ros.rackfile.checks.tasks import check_tasks
 
