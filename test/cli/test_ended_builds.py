@@ -7,8 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from compile.native.support import await_that, begun_compiler_of, has_ended
+from compile.native.support import begun_compiler_of
 from rack.helpers import written_in
+from waiting import has_ended, wait_until
 
 from automax_ros.cli.main import main
 
@@ -78,5 +79,5 @@ def test_a_signal_ends_the_compilers_too(folder, tmp_path, command, number, code
         process.kill()
     told = "automax run: ended before its first scan; nothing was recorded or reported\n" if command is RUN else ""
     assert (process.returncode, err) == (code, told)
-    await_that(lambda: has_ended(begun))
-    await_that(lambda: list(temporary.iterdir()) == [])
+    wait_until(lambda: has_ended(begun))
+    wait_until(lambda: list(temporary.iterdir()) == [])
