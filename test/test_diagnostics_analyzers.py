@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 import yaml
+from rack.helpers import config_at
 
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig, driven_plants
@@ -61,8 +62,7 @@ def status_names(config: RackConfig) -> list[str]:
 
 @pytest.mark.parametrize("path", RACKS, ids=lambda path: path.parent.name)
 def test_each_status_is_in_the_group_of_its_node(path: Path) -> None:
-    config = load(path).config
-    assert config is not None
+    config = config_at(path)
     for space in (config.namespace, f"plant/{config.namespace}"):
         for name in status_names(config):
             placed = name.replace(config.namespace, space, 1)

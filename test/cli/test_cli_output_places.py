@@ -2,28 +2,14 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 
 import pytest
 from scenario.stimuli.helpers import DRAW, RACK, SPEED
 
+pytestmark = pytest.mark.usefixtures("no_waiting")
 NOBODY = "it is a pipe without a reader"
-
-
-@pytest.fixture(autouse=True)
-def no_waiting():
-    """End a test that waits for the pipe's other end."""
-
-    def end(_number, _frame):
-        raise TimeoutError("waits for a pipe")
-
-    before = signal.signal(signal.SIGALRM, end)
-    signal.alarm(30)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import signal
 
 import pytest
 from recordings.independent import GOLDEN
@@ -10,6 +9,7 @@ from recordings.independent import GOLDEN
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.playback import survey
 
+pytestmark = pytest.mark.usefixtures("no_waiting")
 COMMANDS = {
     "info": ["bag", "info", "bag"],
     "check": ["bag", "info", "bag", "--check"],
@@ -19,20 +19,6 @@ COMMANDS = {
     "plot": ["plot", "bag", "SPEED_FDBK%", "-o", "out.png"],
     "report": ["report", "bag", "-o", "out.html"],
 }
-
-
-@pytest.fixture(autouse=True)
-def no_waiting():
-    """End a test that waits for the pipe's other end."""
-
-    def end(_number, _frame):
-        raise TimeoutError("waits for a pipe")
-
-    before = signal.signal(signal.SIGALRM, end)
-    signal.alarm(10)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
 
 
 @pytest.fixture(params=["scans_0.mcap", "metadata.yaml", "scans_0.mcap alone", "other.mcap"])

@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from compile.native.support import await_that, begun_compiler_of, has_ended
+from compile.native.support import begun_compiler_of
+from rack.helpers import written_in
+from waiting import has_ended, wait_until
 
 from automax_ros.cli.main import main
 
@@ -36,9 +38,7 @@ REPLAY = ("replay", "bag")
 def folder(tmp_path_factory) -> Path:
     """A rack, a table and a recording."""
     made: Path = tmp_path_factory.mktemp("alone")
-    (made / "rack.yaml").write_text(RACK)
-    (made / "LEAD.BLK").write_text(TASK)
-    (made / "SHAPE.BLK").write_text(TASK.replace("12", "13").replace("OUTPUT=OUT%", "OUTPUT=REF%"))
+    written_in(made, RACK, LEAD=TASK, SHAPE=TASK.replace("12", "13").replace("OUTPUT=OUT%", "OUTPUT=REF%"))
     (made / "IN.csv").write_text("REF%\n5\n")
     options = ("--simulated", "--duration", "0.1", "--record", str(made / "bag"), "--native", "off")
     assert main(["run", str(made / "rack.yaml"), *options]) == 0
@@ -79,5 +79,5 @@ def test_a_signal_ends_the_compilers_too(folder, tmp_path, command, number, code
         process.kill()
     told = "automax run: ended before its first scan; nothing was recorded or reported\n" if command is RUN else ""
     assert (process.returncode, err) == (code, told)
-    await_that(lambda: has_ended(begun))
-    await_that(lambda: list(temporary.iterdir()) == [])
+    wait_until(lambda: has_ended(begun))
+    wait_until(lambda: list(temporary.iterdir()) == [])

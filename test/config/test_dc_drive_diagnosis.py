@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from rack.helpers import rack_at
 
 from automax_ros.drive.plant.faults import execute_verb, values_of
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 
 EXAMPLE = Path(__file__).parents[2] / "config" / "dc_drive"
 SPEEDS_RPM = (500, 720, 930, 1130, 1340, 1550, 1750)
@@ -69,9 +69,7 @@ def held(folder: Path, rpm: int, execution: str, model: str) -> Rack:
     lines = [f"    load: {{speed_rpm: {rpm}}}" if line.strip().startswith("load:") else line for line in lines]
     text = "\n".join(lines).replace("57C435", model).replace("operator: true", f"execution: {execution}", 1)
     (folder / "rack.yaml").write_text(text + "\n")
-    found = load(folder / "rack.yaml")
-    assert found.config is not None, found.diagnostics
-    rack = Rack(found.config)
+    rack = rack_at(folder / "rack.yaml")
     rack.start()
     rack.run(0.6)
     rack.write("CML_RUN@", True)

@@ -11,6 +11,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from soaking import in_soak
 
 from automax_ros.cli.main import main
 from automax_ros.messages.stream.stream import RackStream
@@ -255,20 +256,11 @@ def recorded_in_parts(folder: Path, seconds: float, parts: int) -> tuple[dict[st
     return digest(folder), sizes
 
 
-def flat_and_repeatable(folder: Path, seconds: float) -> None:
-    first, sizes = recorded_in_parts(folder / "one", seconds, 12)
-    assert recorded_in_parts(folder / "two", seconds, 1)[0] == first
+@pytest.mark.parametrize("seconds", [10, in_soak(3600, timeout_s=3600)])
+def test_a_run_twice_in_flat_memory(tmp_path, seconds) -> None:
+    first, sizes = recorded_in_parts(tmp_path / "one", seconds, 12)
+    assert recorded_in_parts(tmp_path / "two", seconds, 1)[0] == first
     assert max(sizes[1:]) <= sizes[1] * 1.02
-
-
-def test_ten_seconds_twice_in_flat_memory(tmp_path):
-    flat_and_repeatable(tmp_path, 10)
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(3600)
-def test_an_hour_twice_in_flat_memory(tmp_path):
-    flat_and_repeatable(tmp_path, 3600)
 
 
 def resident() -> int:

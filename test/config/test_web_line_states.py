@@ -5,8 +5,9 @@ from __future__ import annotations
 import copy
 from pathlib import Path
 
+from rack.helpers import config_at
+
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 
 CONFIG = Path(__file__).parents[2] / "config" / "web_line" / "rack.yaml"
 MS = 1_000_000
@@ -26,8 +27,7 @@ def under_way(state: object) -> set[str]:
 
 
 def test_the_web_line_goes_on_from_the_middle_of_scans():
-    config = load(CONFIG).config
-    assert config is not None
+    config = config_at(CONFIG)
     rack = Rack(config)
     rack.start([("ESTOP_OK@", True), ("WEB_OK@", True), ("SECT_READY@", True), ("UNW_READY@", True), ("LINE_SP%", 500)])
     rack.run(1.0)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from rack.helpers import rack_at
 from yaml_core import data_of
 
 from automax_ros.blocks.catalogue import CATALOGUE
@@ -18,7 +19,6 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import Severity
 from automax_ros.language.checks.checker import check
 from automax_ros.language.tree.task_kind import is_task_file
-from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import KEYS, load
 from automax_ros.rackfile.loader import schema as rack_schema
 from automax_ros.scenario.stimuli.schema import schema as stimuli_schema
@@ -130,9 +130,7 @@ def test_racks_with_their_tasks(page, tmp_path):
     """What a page shows as files of one rack fits together."""
     prepare(page, tmp_path)
     stub_tasks(tmp_path / "rack.yaml")
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_at(tmp_path / "rack.yaml")
     rack.start()
     rack.run(0.5)
     assert rack.operations.stopped is None

@@ -4,35 +4,20 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from waiting import PATIENCE_S, has_ended, wait_until
 
 from automax_ros.parallel.job import MOST_TRIES, Job, Workers, usable_cores
 from automax_ros.parallel.run import run_jobs
 from parallel import works
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 240
 
 
 def squares(count):
     return [Job(f"square {number}", works.squared, (number,)) for number in range(count)]
-
-
-def is_gone(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return True
-
-
-def wait_until(holds):
-    end = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
@@ -65,7 +50,7 @@ def test_two_jobs_are_two_other_processes():
     found = {item.result for item in run_jobs([Job(str(n), works.own_process, (n,)) for n in range(40)], Workers(2))}
     assert len(found) == 2
     assert os.getpid() not in found
-    wait_until(lambda: all(map(is_gone, found)))
+    wait_until(lambda: all(map(has_ended, found)))
 
 
 def test_one_job_is_this_process():
@@ -106,7 +91,7 @@ def test_what_is_under_way_is_given_up_when_it_shall_stop(tmp_path):
     pieces = [*squares(1), *(Job(f"long {n}", works.long, (str(tmp_path), n)) for n in range(3))]
     done = run_jobs(pieces, Workers(2), should_stop=lambda: len(list(tmp_path.iterdir())) == 2)
     assert [item.result for item in done] == [0]
-    assert all(is_gone(int(file.read_text())) for file in tmp_path.iterdir())
+    assert all(has_ended(int(file.read_text())) for file in tmp_path.iterdir())
 
 
 def test_one_job_stops_between_two_pieces():
@@ -125,7 +110,7 @@ def test_an_error_of_the_one_who_is_told_ends_all(tmp_path):
     pieces = [Job("long", works.long, (str(tmp_path), 7)), *squares(3)]
     with pytest.raises(Enough):
         run_jobs(pieces, Workers(2), told)
-    assert is_gone(int((tmp_path / "7").read_text()))
+    assert has_ended(int((tmp_path / "7").read_text()))
 
 
 THREADS = {
@@ -168,7 +153,7 @@ def test_no_worker_outlives_the_one_that_gives_it_pieces(tmp_path, number, threa
         output, errors = process.communicate(timeout=PATIENCE_S)
     assert errors == ""
     assert output == ("interrupted\n" if number == signal.SIGINT else "")
-    wait_until(lambda: all(is_gone(int(file.read_text())) for file in tmp_path.iterdir()))
+    wait_until(lambda: all(has_ended(int(file.read_text())) for file in tmp_path.iterdir()))
 
 
 COPIED = """

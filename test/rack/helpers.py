@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import LoadResult, load
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
@@ -20,6 +21,20 @@ def config_at(path: Path) -> RackConfig:
 def rack_at(path: Path, **options: Any) -> Rack:
     """Return the rack of a file, not started."""
     return Rack(config_at(path), **options)
+
+
+def written_in(folder: Path, yaml: str, **tasks: str) -> Path:
+    """Write a rack file and the sources of its Control Block tasks."""
+    for name, text in tasks.items():
+        (folder / f"{name}.BLK").write_text(text, encoding="utf-8")
+    path = folder / "rack.yaml"
+    path.write_text(yaml, encoding="utf-8")
+    return path
+
+
+def rack_from(folder: Path, yaml: str, **tasks: str) -> Rack:
+    """Return the rack of a file with its tasks, written there and not started."""
+    return rack_at(written_in(folder, yaml, **tasks))
 
 
 def run_for(rack: Rack, seconds: float = 0.0) -> Rack:
@@ -40,6 +55,16 @@ class Observer:
     def tuned(self, *_: Any) -> None: ...
 
     def operated(self, *_: Any) -> None: ...
+
+
+class Told(Observer):
+    """Notes operations; everything else goes by."""
+
+    def __init__(self) -> None:
+        self.operations: list[Operation] = []
+
+    def operated(self, operation: Operation) -> None:
+        self.operations.append(operation)
 
 
 def write(folder: Path, text: str) -> Path:

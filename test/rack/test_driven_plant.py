@@ -8,7 +8,7 @@ import pytest
 
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from rack.helpers import config_at, good, rack_at
+from rack.helpers import good, rack_at, rack_from
 
 RACK = """\
 rack: LINE1
@@ -159,11 +159,8 @@ PART = """\
 
 def test_two_drives_pull_on_one_web(tmp_path):
     """One pulls with 30 % of LIM_BAR, the other brakes with 20 %: the difference turns both inertias."""
-    (tmp_path / "LINE.BLK").write_text(PART.format(drive="A", slot=7, digital=8))
-    (tmp_path / "DRAW.BLK").write_text(PART.format(drive="B", slot=9, digital=10))
-    (tmp_path / "rack.yaml").write_text(TWO)
-    config = config_at(tmp_path / "rack.yaml")
-    rack = started(Rack(config))
+    parts = {"LINE": PART.format(drive="A", slot=7, digital=8), "DRAW": PART.format(drive="B", slot=9, digital=10)}
+    rack = started(rack_from(tmp_path, TWO, **parts))
     rack.run(0.4)
     assert (rack.value("STATE_A@"), rack.value("STATE_B@")) == (True, True)
     rack.write("REF_A%", 1229)

@@ -264,31 +264,20 @@ def test_a_frozen_word_and_its_bits_keep_the_order_of_writes(tmp_path):
     assert (rack.value("POSITION%"), rack.value("BIT@")) == (9, True)
 
 
-def test_what_an_operator_sets_waits_too(tmp_path):
-    rack = run_for(built(tmp_path, FOLLOW=(5, FOLLOW)))
-    shown: list[object] = []
-
-    def move(_: int) -> None:
-        rack.adjust.set("POSITION%", 6)
-        shown.append(rack.value("POSITION%"))
-
-    rack.scheduler.at(22 * MS, EventKey(EventClass.IO, 15, "after the interrupt"), move)
-    rack.run(0.023)
-    assert (shown, rack.value("SEEN%"), rack.value("POSITION%")) == ([0], 0, 6)
-
-
-def test_inputs_that_nobody_waits_for_follow_the_process(tmp_path):
+@pytest.mark.parametrize("waits", [True, False])
+def test_what_an_operator_sets_waits_too_and_what_nobody_waits_for_follows_the_process(tmp_path, waits):
     rack = run_for(built(tmp_path, FOLLOW=(5, FOLLOW)), 0.01)
-    rack.operations.stop("FOLLOW")
+    if not waits:
+        rack.operations.stop("FOLLOW")
     shown: list[object] = []
 
     def move(_: int) -> None:
-        rack.write("POSITION%", 6)
+        (rack.adjust.set if waits else rack.write)("POSITION%", 6)
         shown.append(rack.value("POSITION%"))
 
     rack.scheduler.at(22 * MS, EventKey(EventClass.IO, 15, "after the interrupt"), move)
-    rack.run(0.02)
-    assert shown == [6]
+    rack.run(0.013)
+    assert (shown, rack.value("SEEN%"), rack.value("POSITION%")) == ([0 if waits else 6], 0, 6)
 
 
 def test_stop_all_ends_interrupts_and_frees_inputs(tmp_path):

@@ -12,11 +12,12 @@ from automax_ros.rack.rack import Rack
 from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
 from automax_ros.scenario.stimuli.player import StimuliPlayer
+from rack.helpers import Observer
 
 MS = 1_000_000
 
 
-class Log:
+class Log(Observer):
     """Writes from outside and scans of SPEED, by time."""
 
     def __init__(self, rack: Rack) -> None:
@@ -37,10 +38,6 @@ class Log:
             for item in group.entries()
             if kinds[item.writer] is WriterKind.OPERATOR
         ]
-
-    def tuned(self, task: Task, now_ns: int) -> None: ...
-
-    def operated(self, operation: object) -> None: ...
 
     def of(self, name: str) -> list[tuple[int, Value]]:
         return [(time, value) for time, label, value in self.writes if label == name]

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from rack.helpers import rack_at
 
 from automax_ros.core.diagnostics import Diagnostic
 from automax_ros.core.problems import Severity
@@ -31,9 +32,7 @@ def errors(diagnostics: list[Diagnostic]) -> list[tuple[int, str, str]]:
 
 @pytest.fixture(scope="module")
 def rack() -> Rack:
-    config = load(FOLDER / "rack.yaml").config
-    assert config is not None
-    return Rack(config)
+    return rack_at(FOLDER / "rack.yaml")
 
 
 @pytest.mark.parametrize("path", STIMULI, ids=lambda path: path.stem)

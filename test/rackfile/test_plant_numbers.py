@@ -4,10 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rack.helpers import config_at
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.user_error import UserError
-from automax_ros.rackfile.loader import load, load_stored
+from automax_ros.rackfile.loader import load_stored
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.plants import PlantConfig
 from automax_ros.rackfile.plant_numbers import plant_number, with_numbers
@@ -17,9 +18,7 @@ CONFIG = Path(__file__).parents[2] / "config" / "dc_drive" / "rack.yaml"
 
 @pytest.fixture(scope="module")
 def config() -> RackConfig:
-    found = load(CONFIG).config
-    assert found is not None
-    return found
+    return config_at(CONFIG)
 
 
 def loaded(text: str) -> RackConfig:

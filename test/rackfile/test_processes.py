@@ -9,10 +9,10 @@ from config.examples import CONFIG, loaded
 from hypothesis import given
 from hypothesis import strategies as st
 from rack.drives.drive_tasks import CML, folder_of
+from rack.helpers import config_at
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.processes import MEMORY_PROCESS, NoSuchProcess, _groups, process_named, processes_of
 
@@ -31,9 +31,7 @@ def config_of(folder: Path, slots: str, more: str = "", **sources: str) -> RackC
         (folder / f"{name}.{kind}").write_text(text)
     path = folder / "rack.yaml"
     path.write_text(f"rack: PM1\nslots:\n  0: {{module: 57C413}}\n{slots}{more}")
-    result = load(path)
-    assert result.config is not None, result.diagnostics
-    return result.config
+    return config_at(path)
 
 
 def slots_of(config: RackConfig) -> list[tuple[int, ...]]:
@@ -61,8 +59,7 @@ def test_modules_that_meet_at_registers_alone_are_a_process_each(tmp_path):
 
 
 def test_lone_processor_holds_common_memory(tmp_path):
-    config = load(folder_of(tmp_path)).config
-    assert config is not None
+    config = config_at(folder_of(tmp_path))
     (process,) = processes_of(config)
     assert (process.name, process.slots, process.holds_common_memory) == (MEMORY_PROCESS, (0, 7, 8), True)
     assert process.modules == ("processor_0", "drive_7", "digital_io_8")

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from rack.helpers import rack_at
 
 from automax_ros.messages.cdr.cdr import decode
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 
 PAGE = Path(__file__).parents[2] / "docs" / "rack_yaml.md"
@@ -71,9 +71,7 @@ def behaviour(folder: Path, text: str) -> Behaviour:
     (folder / "OUT.BLK").write_text(OUTPUT)
     path = folder / "rack.yaml"
     path.write_text(text)
-    result = load(path)
-    assert result.config is not None, result.diagnostics
-    rack = Rack(result.config)
+    rack = rack_at(path)
     messages: list[tuple[str, Any]] = []
     stream = RackStream(rack, 1)
     stream.add_sink(lambda topic: lambda _, data: messages.append((topic.name, decode(topic.type_name, data))))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rack.helpers import rack_from
+
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 
 YAML = """\
 rack: LINE1
@@ -64,9 +65,4 @@ WORK = """\
 
 def build(folder: Path, yaml: str = YAML, **tasks: str) -> Rack:
     """The rack, with some of its texts replaced."""
-    for name, text in {"SPEED": SPEED, "WORK": WORK, **tasks}.items():
-        (folder / f"{name}.BLK").write_text(text, encoding="utf-8")
-    (folder / "rack.yaml").write_text(yaml, encoding="utf-8")
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_from(folder, yaml, **{"SPEED": SPEED, "WORK": WORK, **tasks})

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rack.helpers import config_at
+
 from automax_ros.compile.base.layout import Layout
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.runtime.tasks.task import Status, Task
 
@@ -73,11 +74,10 @@ class Reexecution:
         self._reader = BagReader(bag)
         for attachment in self._reader.attachments():
             (folder / attachment.name).write_bytes(attachment.data)
-        result = load(folder / "rack.yaml")
-        assert result.config is not None
-        self._kinds = [variable.type for variable in result.config.variables]
-        names = [variable.name for variable in result.config.variables]
-        compiled = {task.name: task.compiled for task in Rack(result.config).tasks}
+        config = config_at(folder / "rack.yaml")
+        self._kinds = [variable.type for variable in config.variables]
+        names = [variable.name for variable in config.variables]
+        compiled = {task.name: task.compiled for task in Rack(config).tasks}
         self._memories = {name: RecordedMemory(names) for name in compiled}
         self._tasks = {name: _task(item, self._memories[name]) for name, item in compiled.items()}
         self._known: dict[str, int] = {}

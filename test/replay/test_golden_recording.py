@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rack.helpers import rack_at
+
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.write.recorder import Recorder
 
@@ -20,9 +20,7 @@ def messages(bag: Path) -> list[tuple[str, int, object]]:
 
 
 def test_the_example_rack_does_what_the_recording_says(tmp_path: Path) -> None:
-    config = load(ROOT / "config" / "section_drive" / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_at(ROOT / "config" / "section_drive" / "rack.yaml")
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, tmp_path / "bag")
     stream.begin()

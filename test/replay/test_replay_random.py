@@ -5,14 +5,12 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-import pytest
 from compile.programs import checked, outside_writes, tasks
-from compile.support import repeatable
-from hypothesis import given
 from hypothesis import strategies as st
+from rack.helpers import rack_from
+from soaking import holds_for
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from replay.replays import record, replayed
 
 YAML = """\
@@ -31,11 +29,7 @@ HISTORY = st.lists(outside_writes(), min_size=4, max_size=4)
 def recording(text: str, history, folder: Path) -> Path:
     """The task in a rack of its own, 5 scans long, with writes from outside between its scans."""
     checked(text)
-    (folder / "rack.yaml").write_text(YAML)
-    (folder / "TASK.BLK").write_text(text)
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_from(folder, YAML, TASK=text)
 
     def write(made: Rack, number: int) -> None:
         for name, value in history[number - 1].items() if number else ():
@@ -46,7 +40,8 @@ def recording(text: str, history, folder: Path) -> Path:
     return record(rack, folder / "bag", write, slices=5, seconds=5 * 0.022)
 
 
-def replays_identically(text: str, history) -> None:
+@holds_for(15, tasks(), HISTORY, soak=(500, (tasks(4), HISTORY)))
+def test_random_tasks_replay_identically(text, history) -> None:
     with tempfile.TemporaryDirectory() as name:
         bag = recording(text, history, Path(name))
         report = replayed(bag)
@@ -56,38 +51,11 @@ def replays_identically(text: str, history) -> None:
         assert begun.identical, begun.text()
 
 
-def remark_changes_nothing(text: str, history) -> None:
+@holds_for(10, tasks(), HISTORY, soak=(250, (tasks(4), HISTORY)))
+def test_a_remark_changes_nothing(text, history) -> None:
     """As an edited task, which is compared by variable: still identical."""
     with tempfile.TemporaryDirectory() as name:
         bag = recording(text, history, Path(name))
         report = replayed(bag, {"TASK": f"1 ! edited\n{text}"})
         assert report.tasks[0].edited
         assert report.identical, report.text()
-
-
-@given(tasks(), HISTORY)
-@repeatable(15)
-def test_random_tasks_replay_identically(text, history):
-    replays_identically(text, history)
-
-
-@given(tasks(), HISTORY)
-@repeatable(10)
-def test_a_remark_changes_nothing(text, history):
-    remark_changes_nothing(text, history)
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(1200)
-@given(tasks(4), HISTORY)
-@repeatable(500)
-def test_random_tasks_replay_identically_long(text, history):
-    replays_identically(text, history)
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(1200)
-@given(tasks(4), HISTORY)
-@repeatable(250)
-def test_a_remark_changes_nothing_long(text, history):
-    remark_changes_nothing(text, history)

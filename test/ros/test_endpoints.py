@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rack.helpers import config_at
 from rclpy.context import Context
 from rclpy.duration import Infinite
 from rclpy.qos import (
@@ -18,7 +19,6 @@ from rclpy.qos import (
 )
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.ros.rack_nodes import RackNodes
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -41,8 +41,7 @@ USUAL = QoSProfile(depth=10, **WITHOUT_END)
 
 @pytest.fixture(params=["dc_drive", "section_drive", "two_racks/winder"])
 def live(request, ros_domain_id):
-    config = load(CONFIG / request.param / "rack.yaml").config
-    assert config is not None
+    config = config_at(CONFIG / request.param / "rack.yaml")
     context = Context()
     context.init(args=[])
     with RackNodes(Rack(config), context=context) as nodes:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
+from rack.helpers import Observer, rack_at
 from system.support import TYPES, Client
 
 from automax_ros.core.ticks import NS_PER_MS
@@ -14,7 +15,7 @@ from automax_ros.ros.setup import process as executor_module
 from ros.support import PATIENCE_NS
 
 
-class Observer:
+class Scans(Observer):
     """Notes the scans of one task, and may do something in each."""
 
     def __init__(self, name: str, action: Callable[[int], None] = lambda _: None) -> None:
@@ -27,24 +28,13 @@ class Observer:
             self.scans.append((record.scan, record.time_ns, record.skipped))
             self._action(record.scan)
 
-    def written(self, writes):
-        pass
-
-    def tuned(self, task, now_ns):
-        pass
-
-    def operated(self, operation):
-        pass
-
 
 @pytest.fixture
 def live(ros_domain_id):
     """A live rack that is closed at the end."""
     from automax_ros.ros.rack_nodes import LiveRack
 
-    config = load(TYPES).config
-    assert config is not None
-    made = LiveRack(Rack(config, stopwatch=time.perf_counter_ns))
+    made = LiveRack(rack_at(TYPES, stopwatch=time.perf_counter_ns))
     yield made
     made.close()
 
@@ -68,7 +58,7 @@ def test_stall_skips_scans_counts_them_and_keeps_the_grid(live):
         if scan == 20:
             time.sleep(0.1)
 
-    observer = Observer("COPY", stall)
+    observer = Scans("COPY", stall)
     live.rack.observe(observer)
     live.start([])
     run_until(live, lambda: len(observer.scans) > 60)
@@ -84,7 +74,7 @@ def test_stall_skips_scans_counts_them_and_keeps_the_grid(live):
 
 
 def test_duration_ends_the_run_at_its_instant(live):
-    observer = Observer("FAST")
+    observer = Scans("FAST")
     live.rack.observe(observer)
     live.start([("REF%", 12)])
     live.run(200 * NS_PER_MS, lambda _: None)
@@ -96,7 +86,7 @@ def test_duration_ends_the_run_at_its_instant(live):
 
 def test_first_scans_stand_at_zero(live):
     """Start-up work is done before rack time 0: the first scan of every task stands at 0, unless the host is late."""
-    observers = [Observer(name) for name in ("FAST", "SLOW", "COPY")]
+    observers = [Scans(name) for name in ("FAST", "SLOW", "COPY")]
     for observer in observers:
         live.rack.observe(observer)
     live.start([])
@@ -111,7 +101,7 @@ def test_write_is_stamped_with_its_own_instant(live):
     from std_msgs.msg import Int16
 
     stamps: list[int] = []
-    observer = Observer("SLOW")
+    observer = Scans("SLOW")
     observer.written = lambda writes: stamps.extend(write.time_ns for write in writes if write.writer == 1)
     live.rack.observe(observer)
     live.start([])
@@ -135,9 +125,7 @@ def test_single_threaded_executor_stands_in(ros_domain_id, monkeypatch):
     from automax_ros.ros.rack_nodes import LiveRack
 
     monkeypatch.setattr(executor_module, "dispatches", lambda *_: False)
-    config = load(TYPES).config
-    assert config is not None
-    live = LiveRack(Rack(config))
+    live = LiveRack(rack_at(TYPES))
     try:
         assert isinstance(live._executor, SingleThreadedExecutor)
         live.start([])
@@ -185,9 +173,7 @@ def test_executor_that_dispatches_is_found(ros_domain_id):
 def test_closing_before_the_start_is_clean(ros_domain_id):
     from automax_ros.ros.rack_nodes import LiveRack
 
-    config = load(TYPES).config
-    assert config is not None
-    live = LiveRack(Rack(config))
+    live = LiveRack(rack_at(TYPES))
     live.close()
     live.close()
 

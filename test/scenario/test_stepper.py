@@ -1,11 +1,11 @@
 """A rack a step at a time: where it halts, and what its variables are there."""
 
 import pytest
+from rack.helpers import config_at, written_in
 
 from automax_ros.core.names import NameFault
 from automax_ros.core.user_error import UserError
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status
 from automax_ros.scenario.stepper import Change, Stepper, Why
 
@@ -32,12 +32,8 @@ DRAW = "10 LOCAL N%\n20 CALL SCAN_LOOP(TICKS=2)\n30 N% = N% + 10\n40 END\n"
 
 
 def built(folder, rack=RACK, speed=SPEED, **options) -> Stepper:
-    (folder / "SPEED.BLK").write_text(speed)
-    (folder / "DRAW.BLK").write_text(DRAW)
-    (folder / "rack.yaml").write_text(rack)
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Stepper(result.config, **options)
+    config = config_at(written_in(folder, rack, SPEED=speed, DRAW=DRAW))
+    return Stepper(config, **options)
 
 
 @pytest.fixture

@@ -6,7 +6,9 @@ import json
 import re
 
 import pytest
-from rack.drives.drive_tasks import CML, SPEED, YAML, edited, folder_of, permit, rack_of, running
+from rack.drives.drive_tasks import CML, SPEED, YAML, folder_of, permit, rack_of, running
+from rack.helpers import rack_at
+from replay.replays import edited
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S
@@ -14,7 +16,6 @@ from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
 from automax_ros.rack.operator.retention import Retention
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.memory.views import MemoryValueError
 from automax_ros.runtime.scan.scan_record import Status
 from automax_ros.scenario.stepper import Stepper, Why
@@ -320,9 +321,7 @@ def two_drives(folder):
     commons = "".join(f"  {name}{number}{kind}: {{}}\n" for number in ("", "2") for name, kind in kinds.items())
     path = folder_of(folder, yaml=f"{TWO}{commons}  DIAG%(37,1): {{}}\n  DIAG2%(37,1): {{}}\n")
     (folder / "CML2.BLK").write_text(second(CML))
-    found = load(path)
-    assert found.config is not None, found.diagnostics
-    return Rack(found.config)
+    return rack_at(path)
 
 
 def test_two_drives_run_each_on_its_own_line(tmp_path):

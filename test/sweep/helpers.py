@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from rack.helpers import rack_from
+
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.points import read_varied
 from automax_ros.sweep.run import Plan, RackTemplate, Stimuli
@@ -40,11 +41,7 @@ LOOP = """\
 
 def rack_in(folder: Path) -> Rack:
     """The rack, built and not started."""
-    (folder / "LOOP.BLK").write_text(LOOP)
-    (folder / "rack.yaml").write_text(RACK)
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_from(folder, RACK, LOOP=LOOP)
 
 
 def plan_of(rack: Rack, varied: list[str], measures: str, seconds: str = "0.2", stimuli: Stimuli | None = None) -> Plan:

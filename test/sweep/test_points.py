@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rack.helpers import rack_at
 from scipy.stats import qmc
 
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.user_error import UserError
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.sweep import points
 from automax_ros.sweep.points import grid, read_varied, sample
 from sweep.helpers import rack_in
@@ -24,9 +24,7 @@ def rack(tmp_path_factory: pytest.TempPathFactory) -> Rack:
 
 @pytest.fixture(scope="module")
 def drive() -> Rack:
-    config = load(DRIVE).config
-    assert config is not None
-    return Rack(config)
+    return rack_at(DRIVE)
 
 
 def single(text: str) -> float:

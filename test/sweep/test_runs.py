@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rack.helpers import config_at, rack_at
 
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.parallel.job import Workers
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.sweep.points import grid, read_varied
 from automax_ros.sweep.run import RunOutcome, Stimuli, best_rows, run_point, run_points, run_sweep
 from sweep.helpers import plan_of, rack_in
@@ -156,8 +156,7 @@ def test_what_stimuli_are_refused_is_told_with_the_measures(rack: Rack, tmp_path
 
 
 def test_a_rack_with_another_plant_is_that_of_an_edited_file(tmp_path: Path):
-    config = load(DRIVE).config
-    assert config is not None
+    config = config_at(DRIVE)
     rack = Rack(config)
     texts = ["MOTOR.inertia=1.5", "MOTOR.load.friction_nm=25", "MOTOR.line.v_ll=430"]
     plan = plan_of(rack, texts, "final(RPM) max(CUR_REF%) rms(ARM_V)", "1.5")
@@ -167,8 +166,7 @@ def test_a_rack_with_another_plant_is_that_of_an_edited_file(tmp_path: Path):
     for source in DRIVE.parent.glob("*.B*"):
         (tmp_path / source.name).write_bytes(source.read_bytes())
     (tmp_path / "rack.yaml").write_text(edited, encoding="utf-8")
-    other = load(tmp_path / "rack.yaml").config
-    assert other is not None
+    other = config_at(tmp_path / "rack.yaml")
     assert other.plants[0].load.friction_nm == 25
     varied = run_point(plan, point)
     by_hand = plan_of(Rack(other), [], "final(RPM) max(CUR_REF%) rms(ARM_V)", "1.5")
@@ -184,9 +182,7 @@ def test_numbers_that_contradict_each_other_are_a_fault_of_the_run(tmp_path: Pat
     for source in DRIVE.parent.glob("*.B*"):
         (tmp_path / source.name).write_bytes(source.read_bytes())
     (tmp_path / "rack.yaml").write_text(text, encoding="utf-8")
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_at(tmp_path / "rack.yaml")
     plan = plan_of(rack, ["MOTOR.motor.volts=500"], "final(RPM)", "0.01")
     good, bad = run_points(plan, [(500.0,), (1e-9,)])
     assert good.fault == ""

@@ -13,6 +13,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Any, NamedTuple
 
+from waiting import PATIENCE_S, wait_until
+
 from automax_ros.cli.main import main
 
 ROOT = Path(__file__).parents[2]
@@ -22,9 +24,6 @@ STUCK = RACKS / "stuck" / "rack.yaml"
 COMMAND = (sys.executable, "-m", "automax_ros.cli.main")
 MOST_SHOWN = 100
 """Lines of a program's output that are shown where its test fails."""
-PATIENCE_S = 240.0
-"""After this time a test gives up. It decides nothing where the program is sound: a start takes 2.5 s of a core, and
-sixteen others may want that core too."""
 
 
 class Ended(NamedTuple):
@@ -132,14 +131,6 @@ def catches(pid: int, number: signal.Signals) -> bool:
     """Whether a process handles a signal itself."""
     caught = re.search(r"^SigCgt:\s*([0-9a-f]+)", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
     return caught is not None and bool(int(caught[1], 16) >> (number - 1) & 1)
-
-
-def wait_until(condition: Callable[[], bool], pause_s: float = 0.02) -> None:
-    """Wait for a condition, looking at it again and again."""
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, "the condition never came true"
-        time.sleep(pause_s)
 
 
 class Client:

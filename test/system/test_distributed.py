@@ -12,11 +12,11 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from rack.helpers import config_at
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.messages.cdr.cdr import decode
 from automax_ros.messages.types.messages import NAMES, Scan
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.recordings.read.reader import BagReader
 from system.distributed import PROCESS_NAMES, RINGS, Distributed, Line, copied
@@ -70,8 +70,7 @@ def test_scans_are_those_of_one_process(ros_domain_id, tmp_path):
         task = report["tasks"][f"RING_{ring}"]
         assert 0 < task["scans"] <= due - task["skipped"], "the last that the host has made late are not counted"
         assert report["commons"][f"N_{ring}!"] == task["scans"], "no write was lost, none came twice"
-    config = load(rack / "rack.yaml").config
-    assert config is not None
+    config = config_at(rack / "rack.yaml")
     alone = seen_by(recorded(own), config, 0)
     together = seen_by((decode(NAMES[Scan], item) for item in scans), config, line.began_ns)
     assert len(set(alone.values())) > 300, "the reference has many values"

@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from rack.helpers import config_at
 
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from system.support import TYPES, Automax, Client, consecutive, entries, ns
 
@@ -18,9 +18,7 @@ PERIODS_NS = {"FAST": 5_500_000, "SLOW": 16_500_000, "COPY": 2_500_000}
 
 @pytest.fixture(scope="module")
 def config() -> RackConfig:
-    result = load(TYPES)
-    assert result.config is not None
-    return result.config
+    return config_at(TYPES)
 
 
 @pytest.fixture(scope="module", autouse=True)

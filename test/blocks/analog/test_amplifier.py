@@ -30,42 +30,29 @@ def test_the_formula_with_eight_channels():
     assert amplify(pairs, scale=10) == (sum(channel**2 for channel in range(1, 9)) * 10, 0)
 
 
-@pytest.mark.parametrize(("value", "output"), [(19, 1), (-19, -1), (20, 2), (-20, -2), (9, 0), (-9, 0)])
-def test_the_quotient_truncates_toward_zero(value, output):
-    assert amplify([(value, 1)], scale=10) == (output, 0)
-
-
-def test_only_the_sum_is_divided():
-    """0.6 + 0.6 = 1.2: each channel for itself would give 0 + 0."""
-    assert amplify([(6, 1), (6, 1)], scale=10) == (1, 0)
-
-
-def test_a_gain_of_minus_one_subtracts():
-    """Section 7 note 3."""
-    assert amplify([(500, 1), (120, -1), (30, -1)], scale=1) == (350, 0)
-
-
-def test_a_negative_scale_inverts_the_output():
-    """Section 7 note 4."""
-    assert amplify([(500, 3)], scale=-10) == (-150, 0)
-    assert amplify([(-500, 3)], scale=-10) == (150, 0)
-
-
-def test_a_channel_of_zeros_does_not_end_the_sum():
-    """A null pair is one that is not programmed."""
-    assert amplify([(0, 0), (7, 3), (0, 5), (4, 0), (1, 1)], scale=1) == (22, 0)
+TRUNCATED = [(19, 1), (-19, -1), (20, 2), (-20, -2), (9, 0), (-9, 0)]
+DIVIDED_BY_0 = [(5, 32767), (1, 32767), (-5, -32768), (-1, -32768), (32767, 32767), (-32768, -32768), (0, 0)]
 
 
 @pytest.mark.parametrize(
-    ("value", "gain", "output", "error"),
-    [(32767, 1, 32767, 0), (32768 // 2, 2, 32767, 7001), (-16384, 2, -32768, 0), (-10923, 3, -32768, 7001)],
+    ("pairs", "scale", "output", "error"),
+    [
+        *(pytest.param([(sum_, 1)], 10, output, 0, id=f"{sum_}/10 is truncated") for sum_, output in TRUNCATED),
+        *(pytest.param([(sum_, 1)], 0, output, 7003, id=f"{sum_}/0 is logged") for sum_, output in DIVIDED_BY_0),
+        pytest.param([(6, 1), (6, 1)], 10, 1, 0, id="only the sum is divided: 0.6 + 0.6 = 1.2"),
+        pytest.param([(500, 1), (120, -1), (30, -1)], 1, 350, 0, id="a gain of -1 subtracts (section 7 note 3)"),
+        pytest.param([(500, 3)], -10, -150, 0, id="a negative SCALE inverts the output (section 7 note 4)"),
+        pytest.param([(-500, 3)], -10, 150, 0, id="a negative SCALE inverts a negative output"),
+        pytest.param([(0, 0), (7, 3), (0, 5), (4, 0), (1, 1)], 1, 22, 0, id="a channel of zeros does not end the sum"),
+        pytest.param([(32767, 1)], 1, 32767, 0, id="the largest quotient"),
+        pytest.param([(16384, 2)], 1, 32767, 7001, id="a greater one is clamped and logged"),
+        pytest.param([(-16384, 2)], 1, -32768, 0, id="the smallest quotient"),
+        pytest.param([(-10923, 3)], 1, -32768, 7001, id="a smaller one is clamped and logged"),
+        pytest.param([(-32768, 1)], -1, 32767, 7001, id="-32768/-1 is clamped and logged"),
+    ],
 )
-def test_a_quotient_beyond_16_bit_is_clamped_and_logged(value, gain, output, error):
-    assert amplify([(value, gain)], scale=1) == (output, error)
-
-
-def test_minus_32768_over_minus_one_is_clamped_and_logged():
-    assert amplify([(-32768, 1)], scale=-1) == (32767, 7001)
+def test_output_and_error(pairs, scale, output, error):
+    assert amplify(pairs, scale=scale) == (output, error)
 
 
 # 2 x 32767**2 + 4 x 32767 + 1 = 2**31 - 1, the largest sum; -2 x 32768 x 32767 - 2 x 32768 = -2**31, the smallest.
@@ -112,13 +99,6 @@ def test_a_sum_at_the_edge_of_32_bit_goes_on(zeros):
     # 2**31 - 1 - 2**30 + 32768 - 32767 = 2**30, and -2**31 + 2**30 + 32768 = -32767 x 32768.
     assert amplify([*largest, *nothing, (-32768, 32767), (-32767, 1)], scale=-32768) == (-32768, 0)
     assert amplify([*BOTTOM, *nothing, (-32768, -32768), (-32768, -1)], scale=-32768) == (32767, 0)
-
-
-@pytest.mark.parametrize(
-    ("value", "output"), [(5, 32767), (1, 32767), (-5, -32768), (-1, -32768), (32767, 32767), (-32768, -32768), (0, 0)]
-)
-def test_scale_0_is_logged_and_gives_the_clamp_of_the_sums_sign(value, output):
-    assert amplify([(value, 1)], scale=0) == (output, 7003)
 
 
 def expected(pairs, scale):

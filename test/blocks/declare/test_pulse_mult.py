@@ -13,9 +13,22 @@ def outputs(block, values, **inputs):
     return [block.scan(input=value, **inputs)["output"] for value in values]
 
 
-def test_absolute_mode_carries_the_remainder():
-    """Gain 3/4: 1, 1, 1, 1 gives 0, 1, 1, 1 (0.75, 1.5, 1.25, 1.0)."""
-    assert outputs(run("PULSE_MULT", multiplier=24576), [1, 1, 1, 1]) == [0, 1, 1, 1]
+@pytest.mark.parametrize(
+    ("literals", "values", "given"),
+    [
+        # Gain 3/4: 0.75, 1.5, 1.25, 1.0.
+        pytest.param({"multiplier": 24576}, [1] * 4, [0, 1, 1, 1], id="absolute mode carries the remainder"),
+        pytest.param({"word_size": 12}, [4000, 4010, 4005], [0, 10, -5], id="relative mode gives 0 first"),
+        pytest.param({"word_size": 12}, [4090, 4095, 0, 6], [0, 5, 1, 6], id="relative mode wraps with the word"),
+        pytest.param({"word_size": 12}, [6, 4090, 2042, 4090], [0, -12, -2048, -2048], id="and wraps back"),
+        pytest.param({"word_size": 16}, [32767, -32768, 32767], [0, 1, -1], id="16 bits wrap through the sign"),
+        # 0x3FF against -1 in 10 bits.
+        pytest.param({"word_size": 10}, [0x3FF, -1, 1024 + 4], [0, 0, 5], id="only the low bits of INPUT count"),
+        pytest.param({"word_size": 1}, [0, 1, 1, 0], [0, -1, 0, -1], id="words of one bit"),
+    ],
+)
+def test_outputs_of_absolute_and_relative_mode(literals, values, given):
+    assert outputs(run("PULSE_MULT", **literals), values) == given
 
 
 def test_the_remainder_keeps_its_sign():
@@ -37,28 +50,6 @@ def test_the_default_multiplier_is_a_gain_of_exactly_one(value):
 def test_the_largest_programmed_multiplier_comes_short_of_one():
     """32767 / 32768: 32768 counts in, 32767 out."""
     assert sum(outputs(run("PULSE_MULT", multiplier=32767), [16384, 16384])) == 32767
-
-
-def test_relative_mode_gives_zero_on_the_first_pass():
-    assert outputs(run("PULSE_MULT", word_size=12), [4000, 4010, 4005]) == [0, 10, -5]
-
-
-def test_relative_mode_wraps_with_the_word():
-    block = run("PULSE_MULT", word_size=12)
-    assert outputs(block, [4090, 4095, 0, 6, 4090, 2042, 4090]) == [0, 5, 1, 6, -12, -2048, -2048]
-
-
-def test_sixteen_bit_words_wrap_through_the_sign():
-    assert outputs(run("PULSE_MULT", word_size=16), [32767, -32768, 32767]) == [0, 1, -1]
-
-
-def test_only_the_low_bits_of_input_count():
-    """Bits above WORD_SIZE are masked away: 0x3FF against -1 in 10 bits."""
-    assert outputs(run("PULSE_MULT", word_size=10), [0x3FF, -1, 1024 + 4]) == [0, 0, 5]
-
-
-def test_one_bit_words():
-    assert outputs(run("PULSE_MULT", word_size=1), [0, 1, 1, 0]) == [0, -1, 0, -1]
 
 
 def test_initial_value_is_the_last_input_when_reset_ends():

@@ -21,62 +21,46 @@ def found(index):
     return {"found": True, "output": index}
 
 
-def test_example_1_of_section_29():
-    assert search(15, [40, 30, 20, 10], "compare_gtr") == found(3)
-
-
-def test_example_2_of_section_29():
-    """The printed INPUT of 1501 can only mean 150 (decision)."""
-    assert search(150, [100, 200, 300, 400], "compare_les") == found(1)
-
-
-@pytest.mark.parametrize(
-    ("options", "value", "expected"),
-    [
-        (("compare_equ",), 20, found(2)),
-        (("compare_equ",), 25, NOT_FOUND),
-        (("compare_gtr",), 20, found(3)),
-        (("compare_gtr",), 10, NOT_FOUND),
-        (("compare_gtr",), 41, found(0)),
-        (("compare_les",), 39, found(0)),
-        (("compare_les",), 40, NOT_FOUND),
-        (("compare_gtr", "compare_equ"), 20, found(2)),
-        (("compare_gtr", "compare_equ"), 21, found(2)),
-        (("compare_gtr", "compare_equ"), 9, NOT_FOUND),
-        (("compare_les", "compare_equ"), 40, found(0)),
-        (("compare_les", "compare_equ"), 41, NOT_FOUND),
-        (("compare_gtr", "compare_les"), 40, found(1)),
-        (("compare_gtr", "compare_les"), 20, found(0)),
-    ],
-)
-def test_one_or_two_comparisons(options, value, expected):
-    """INPUT against the element, in this order; two comparisons are joined by OR."""
-    assert search(value, [40, 30, 20, 10], *options) == expected
-
-
-def test_the_first_match_ends_the_search():
-    assert search(5, [1, 5, 5, 5], "compare_equ") == found(1)
-    assert search(5, [9, 1, 2, 3], "compare_gtr") == found(1)
-
-
-def test_element_0_and_the_last_element_are_searched():
-    assert search(7, [7, 0, 0], "compare_equ") == found(0)
-    assert search(7, [0, 0, 7], "compare_equ") == found(2)
-    assert search(7, [7], "compare_equ") == found(0)
-    assert search(7, [8], "compare_equ") == NOT_FOUND
+FALLING = [40, 30, 20, 10]
 
 
 @pytest.mark.parametrize(
     ("options", "value", "table", "expected"),
     [
+        # The examples of section 29; the printed INPUT of 1501 can only mean 150 (decision).
+        (("compare_gtr",), 15, FALLING, found(3)),
+        (("compare_les",), 150, [100, 200, 300, 400], found(1)),
+        # INPUT against the element, in this order; two comparisons are joined by OR.
+        (("compare_equ",), 20, FALLING, found(2)),
+        (("compare_equ",), 25, FALLING, NOT_FOUND),
+        (("compare_gtr",), 20, FALLING, found(3)),
+        (("compare_gtr",), 10, FALLING, NOT_FOUND),
+        (("compare_gtr",), 41, FALLING, found(0)),
+        (("compare_les",), 39, FALLING, found(0)),
+        (("compare_les",), 40, FALLING, NOT_FOUND),
+        (("compare_gtr", "compare_equ"), 20, FALLING, found(2)),
+        (("compare_gtr", "compare_equ"), 21, FALLING, found(2)),
+        (("compare_gtr", "compare_equ"), 9, FALLING, NOT_FOUND),
+        (("compare_les", "compare_equ"), 40, FALLING, found(0)),
+        (("compare_les", "compare_equ"), 41, FALLING, NOT_FOUND),
+        (("compare_gtr", "compare_les"), 40, FALLING, found(1)),
+        (("compare_gtr", "compare_les"), 20, FALLING, found(0)),
+        # The first match ends the search.
+        (("compare_equ",), 5, [1, 5, 5, 5], found(1)),
+        (("compare_gtr",), 5, [9, 1, 2, 3], found(1)),
+        # Element 0 and the last one are searched.
+        (("compare_equ",), 7, [7, 0, 0], found(0)),
+        (("compare_equ",), 7, [0, 0, 7], found(2)),
+        (("compare_equ",), 7, [7], found(0)),
+        (("compare_equ",), 7, [8], NOT_FOUND),
+        # The ends of the range, where a difference of 16 bits would wrap.
         (("compare_gtr",), 32767, [32767, -32768], found(1)),
         (("compare_les",), -32768, [-32768, 32767], found(1)),
         (("compare_gtr",), -32768, [32767, -32768], NOT_FOUND),
         (("compare_les",), 32767, [32767, -32768], NOT_FOUND),
     ],
 )
-def test_the_ends_of_the_range(options, value, table, expected):
-    """Where a difference of 16 bits would wrap."""
+def test_what_is_found(options, value, table, expected):
     assert search(value, table, *options) == expected
 
 

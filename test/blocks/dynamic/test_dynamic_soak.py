@@ -4,6 +4,7 @@ import math
 
 import pytest
 from compile.support import task_of
+from soaking import in_soak
 
 PERIOD = 1000
 """Scans of the input's period."""
@@ -55,7 +56,8 @@ def bounded(task):
     assert not task.errors.entries
 
 
-def run_without_drift(scans):
+@pytest.mark.parametrize("scans", [20_000, in_soak(10_000_000, timeout_s=3600)])
+def test_scans_do_not_drift(scans):
     task, _ = task_of(TEXT)
     task.run()
     for scan in range(1, 5 * PERIOD):
@@ -87,16 +89,6 @@ def check_first(shape):
     assert max(shape["SLOW%"]) >= 2990
 
 
-def test_twenty_thousand_scans_without_drift():
-    run_without_drift(20_000)
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(3600)
-def test_ten_million_scans_without_drift():
-    run_without_drift(10_000_000)
-
-
 STEADY = """\
 10 LOCAL IN%, PULSE%, SLOW%, WHOLE%, RAMPED%, LOOP%, PLANT%, FIRST@, RISING@
 20 CALL SCAN_LOOP(TICKS=2)
@@ -117,7 +109,8 @@ WHOLE = 77 + 24
 """0.7 / 0.9918 x 111 / s (42.3) while SLOW% goes from 700 to 900, which takes ln(534 / 334) / 1.5 s."""
 
 
-def stays_steady(scans):
+@pytest.mark.parametrize("scans", [20_000, in_soak(10_000_000, timeout_s=3600)])
+def test_a_steady_task_stays_steady(scans):
     task, _ = task_of(STEADY)
     task.run()
     names = ("SLOW%", "WHOLE%", "RAMPED%", "PLANT%", "LOOP%")
@@ -134,13 +127,3 @@ def stays_steady(scans):
             seen.add(tuple(task.value(name) for name in names))
     assert seen == {tuple(steady)}
     bounded(task)
-
-
-def test_a_steady_task_stays_steady():
-    stays_steady(20_000)
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(3600)
-def test_a_steady_task_stays_steady_for_ten_million_scans():
-    stays_steady(10_000_000)

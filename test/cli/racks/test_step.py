@@ -121,13 +121,11 @@ def test_stimuli_and_settings(automax, step):
         ("break NOTHING%", "no common variable 'NOTHING%'"),
         ("clear SUM!", "there is no breakpoint 'SUM!'"),
         ("show TABLE%", "name one element"),
-        ("set REF%=40000", "is not a value for REF%"),
         ("set AUTORUNSTATUS@=1", "AUTORUNSTATUS@"),
         ("tune SPEED.N%=1", "refused: task SPEED has no tunable"),
         ("tune SPEED.N%", "is not TASK.NAME=VALUE"),
         ("run SPEED", "refused: task SPEED runs already"),
         ("list NOBODY", "no task 'NOBODY'"),
-        ("unforce SUM!", "refused: SUM! is not forced"),
     ],
 )
 def test_a_command_that_fails_is_told_and_the_script_goes_on(step, command, message):

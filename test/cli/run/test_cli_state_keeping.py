@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
+from rack.helpers import rack_at, written_in
 
 from automax_ros.cli.run.saving import SAVE_PERIOD_NS, SavedState
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 
 RACK = """\
 rack: KEEP
@@ -28,15 +28,12 @@ TASK = """\
 
 @pytest.fixture
 def folder(tmp_path) -> Path:
-    (tmp_path / "rack.yaml").write_text(RACK)
-    (tmp_path / "T.BLK").write_text(TASK)
+    written_in(tmp_path, RACK, T=TASK)
     return tmp_path
 
 
 def made(folder: Path) -> tuple[Rack, SavedState]:
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_at(folder / "rack.yaml")
     keeping = SavedState(rack, folder / "state")
     rack.start(keeping.settings)
     return rack, keeping
@@ -101,9 +98,7 @@ def test_a_folder_that_cannot_be_written_is_told_once_and_not_tried_again(folder
 
 
 def test_without_a_folder_nothing_is_kept(folder):
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    keeping = SavedState(Rack(config), None)
+    keeping = SavedState(rack_at(folder / "rack.yaml"), None)
     keeping.update(SAVE_PERIOD_NS)
     keeping.freeze()
     keeping.end()

@@ -8,12 +8,12 @@ import shutil
 from pathlib import Path
 
 import pytest
+from rack.helpers import config_at, rack_at
 
 from automax_ros.cli.output.screen import erasing, fitting
 from automax_ros.cli.run import status as status_module
 from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.value_names import watched
 
 RACK = """\
@@ -390,9 +390,7 @@ def test_recording_options_need_a_recording(run):
 def rack(automax):
     automax.write("TASK.BLK", TASK)
     automax.write("rack.yaml", RACK)
-    config = load(automax.folder / "rack.yaml").config
-    assert config is not None
-    return Rack(config, stopwatch=itertools.count(0, 110_000).__next__)
+    return rack_at(automax.folder / "rack.yaml", stopwatch=itertools.count(0, 110_000).__next__)
 
 
 def test_plain_line_comes_every_five_seconds(rack, capsys, monkeypatch):
@@ -414,8 +412,7 @@ def test_a_value_is_shown_by_its_scale_and_with_its_unit(automax, capsys):
         "  P%: {slot: 6, register: 0, ros: in, scale: {counts: [0, 4095], value: [0, 10]}, unit: bar}\n"
         "  D%: {unit: fpm}\n"
     )
-    config = load(automax.write("rack.yaml", rack)).config
-    assert config is not None
+    config = config_at(automax.write("rack.yaml", rack))
     rack = Rack(config)
     rack.start([("P%", 1000), ("D%", 7)])
     StatusDisplay(rack, watched(config, None), live=False).finish(None)

@@ -9,16 +9,15 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 import pytest
+from waiting import PATIENCE_S, has_ended, wait_until
 
 from automax_ros.cli.run.process_messages import ProcessOutput, Reported, TextLine, parse_message, send_report
 from automax_ros.cli.run.status import Progress, Summary, merged_progress, merged_summary
 from automax_ros.cli.run.supervisor import BACKOFFS_NS, STAGE_NS, WINDOW_NS, ProcessSpec, Restarts, Supervisor
 from automax_ros.core.ticks import NS_PER_S
 
-PATIENCE_S = 240.0
 REPORT = 'print(json.dumps({"report": {"ok": True}}), flush=True)'
 BEGINS = 'print(json.dumps({"progress": {"now_ns": 1}}), flush=True)\n'
 WAITS = """
@@ -199,17 +198,7 @@ def test_children_end_with_a_watcher_that_is_killed(tmp_path):
     process.kill()
     process.wait()
     process.stdout.close()
-    deadline = time.monotonic() + PATIENCE_S
-    while any(lives(pid) for pid in pids):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
-def lives(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    wait_until(lambda: all(map(has_ended, pids)))
 
 
 def test_deaths_count_together_for_ten_seconds():

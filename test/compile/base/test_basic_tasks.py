@@ -77,27 +77,22 @@ def test_start_every_counts_from_the_statement_and_goes_on_after_it() -> None:
     assert task.value("A%") == 1
 
 
-def test_instants_of_start_every_that_a_longer_run_has_passed_are_left_out() -> None:
-    task, _ = basic_task_of(text("START EVERY 10 TICKS", "A% = A% + 1", "DELAY 25 TICKS"))
+@pytest.mark.parametrize(
+    ("delay", "expected", "next_start"),
+    [
+        pytest.param(25, [0, 25, 30, 55], 60, id="instants that a longer run has passed are left out"),
+        pytest.param(10, [0, 10, 10, 20, 20], 30, id="a run that ends just when the next begins misses none"),
+    ],
+)
+def test_instants_of_start_every(delay, expected, next_start) -> None:
+    task, _ = basic_task_of(text("START EVERY 10 TICKS", "A% = A% + 1", f"DELAY {delay} TICKS"))
     task.run(0)
     now, starts = 0, []
-    for _ in range(4):
+    for _ in expected:
         task.scan(now)
         starts.append(now // TICK)
         now = task.wake_ns
-    assert starts == [0, 25, 30, 55]
-    assert now == 60 * TICK
-
-
-def test_a_run_that_ends_just_when_the_next_begins_misses_none() -> None:
-    task, _ = basic_task_of(text("START EVERY 10 TICKS", "A% = A% + 1", "DELAY 10 TICKS"))
-    task.run(0)
-    now, starts = 0, []
-    for _ in range(5):
-        task.scan(now)
-        starts.append(now // TICK)
-        now = task.wake_ns
-    assert starts == [0, 10, 10, 20, 20]
+    assert (starts, now) == (expected, next_start * TICK)
 
 
 def test_a_loop_without_a_wait_gives_others_their_turn_at_the_next_tick() -> None:

@@ -7,13 +7,14 @@ import sysconfig
 from pathlib import Path
 
 import pytest
+from waiting import has_ended, wait_until
 
 from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.native.run import build
 from automax_ros.compile.native.run.build import find_compiler, key_of, library, python_options
 from automax_ros.compile.native.run.cache import NativeCache
 from automax_ros.compile.native.run.task import native_form
-from compile.native.support import await_that, begun_compiler_of, compiler_of, has_ended
+from compile.native.support import begun_compiler_of, compiler_of
 from compile.support import compiled_of, lines
 
 ANSWER = "int answer(void) { return 42; }\n"
@@ -142,7 +143,7 @@ def test_a_compiler_that_hangs_is_ended_with_all_it_has_started(cache, monkeypat
     with pytest.raises(NotNative, match="cc has not ended within 1 s"):
         library(ANSWER, cache, limit_s=1.0)
     child = int(started.read_text())
-    await_that(lambda: has_ended(child))
+    wait_until(lambda: has_ended(child))
     assert files_of(cache) == []
 
 
@@ -185,6 +186,6 @@ def test_a_builder_that_is_killed_leaves_nothing_harmful(cache, tmp_path):
     compiler = int((tmp_path / "begun").read_text())  # blocks until the compiler has begun
     builder.kill()
     builder.wait()
-    await_that(lambda: has_ended(compiler))
+    wait_until(lambda: has_ended(compiler))
     assert not [name for name in files_of(cache) if name.endswith(".so")]
     assert ctypes.CDLL(str(library(ANSWER, cache))).answer() == 42

@@ -8,6 +8,7 @@ import shutil
 from types import SimpleNamespace
 
 import pytest
+from soaking import in_soak
 
 from automax_ros.compile.base import functions
 from automax_ros.compile.base.native_source import NotNative
@@ -198,20 +199,10 @@ def built(tmp_path_factory) -> Built:
     return Built([*ONE, *TWO, *THREE], NativeCache(tmp_path_factory.mktemp("cache") / "native"))
 
 
-def differences(operations: list[Operation], built: Built, count: int, seed: int) -> list[str]:
-    found = [first_difference(operation, built, rows(operation, count, seed)) for operation in operations]
-    return [text for text in found if text]
-
-
-def test_operations_give_python_s_bits(built) -> None:
-    assert differences([*ONE, *TWO, *THREE], built, 200, 1) == []
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(900)
-@pytest.mark.parametrize("seed", range(2))
-def test_operations_give_python_s_bits_for_many_values(built, seed) -> None:
-    assert differences([*ONE, *TWO, *THREE], built, 10_000, 2 + seed) == []
+@pytest.mark.parametrize(("count", "seed"), [(200, 1), *(in_soak(10_000, seed, timeout_s=900) for seed in (2, 3))])
+def test_operations_give_python_s_bits(built, count, seed) -> None:
+    found = [first_difference(item, built, rows(item, count, seed)) for item in (*ONE, *TWO, *THREE)]
+    assert list(filter(None, found)) == []
 
 
 @pytest.mark.parametrize(

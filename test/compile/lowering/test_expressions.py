@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
+from soaking import holds_for
 
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.types import DataType
@@ -17,7 +17,7 @@ from automax_ros.runtime.tasks.task import Task
 from compile.interpreter import Interpreter
 from compile.native.test_random_tasks import compare, installed
 from compile.programs import DECLARATIONS, checked, expressions, numbers
-from compile.support import OTHER, lines, logged, program_of, ran, repeatable
+from compile.support import OTHER, lines, logged, program_of, ran
 
 LOW, HIGH = -(2**31), 2**31 - 1
 INTEGERS = [-32768, -32767, -1, 0, 1, 2, 3, 32766, 32767]
@@ -60,23 +60,11 @@ def statements(draw) -> str:
     return f"{draw(st.sampled_from(target))} = {value}"
 
 
-def agree_on_statement(data, statement: str) -> None:
+@holds_for(70, st.data(), statements(), soak=(2000, (st.data(), statements())))
+def test_compiled_expressions_are_those_of_the_interpreter(data, statement) -> None:
     program = checked(f"{DECLARATIONS}20 CALL SCAN_LOOP(TICKS=4)\n100 {statement}\n200 END\n")
     used = [name for name in simple_names(program) if name in statement]
     agree_on_values(program, {name: data.draw(EDGES[program.symbols[name].type]) for name in used})
-
-
-@given(st.data(), statements())
-@repeatable(70)
-def test_compiled_expressions_are_those_of_the_interpreter(data, statement):
-    agree_on_statement(data, statement)
-
-
-@pytest.mark.soak
-@given(st.data(), statements())
-@repeatable(2000)
-def test_compiled_expressions_are_those_of_the_interpreter_long(data, statement):
-    agree_on_statement(data, statement)
 
 
 VARIABLE_EDGES = {"A%": INTEGERS, "B%": INTEGERS, "D!": DOUBLES, "E!": DOUBLES, "R": REALS, "Q": REALS}

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 from automax_ros.compile import native
-
-PATIENCE_S = 240.0
 
 ABI = (Path(native.__file__).parent / "abi.h").read_text(encoding="utf-8")
 
@@ -69,19 +65,3 @@ def begun_compiler_of(folder: Path, ending: str = "exec sleep 1000") -> Path:
     (folder / "begun").unlink(missing_ok=True)
     os.mkfifo(folder / "begun")
     return compiler_of(folder, f"echo $$ > {folder / 'begun'}; {ending}")
-
-
-def await_that(what: Callable[[], bool]) -> None:
-    """Wait until something is so; fail if it does not come."""
-    deadline = time.monotonic() + PATIENCE_S
-    while not what():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
-
-
-def has_ended(pid: int) -> bool:
-    """Whether a process has ended; whoever takes over orphans buries it when it finds the time."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
-    except (FileNotFoundError, ProcessLookupError):
-        return True

@@ -7,6 +7,7 @@ import shutil
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, seed, settings
+from soaking import in_soak
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Block, Platform
@@ -102,24 +103,15 @@ def without_strings(monkeypatch) -> None:
     monkeypatch.setattr(programs, "simple_statements", lambda: plain)
 
 
-def check_tasks(count: int, least: int, number: int, cache: NativeCache) -> None:
+@pytest.mark.usefixtures("without_strings")
+@pytest.mark.parametrize(("count", "least", "number"), [(26, 10, 3), in_soak(1500, 600, 4, timeout_s=3600)])
+def test_random_tasks_are_the_same_in_c(tmp_path, count: int, least: int, number: int) -> None:
     found = [task for task in map(numeric_task, drawn(tasks(), count, number)) if task is not None]
     assert len(found) >= least
+    cache = NativeCache(tmp_path / "cache")
     for place, compiled in enumerate(found):
         native = native_form(compiled, cache)
         assert_same(native, 6, 6, forced=place % 3 == 0, seed=place)
-
-
-@pytest.mark.usefixtures("without_strings")
-def test_random_tasks_are_the_same_in_c(tmp_path) -> None:
-    check_tasks(26, 10, 3, NativeCache(tmp_path / "cache"))
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(3600)
-@pytest.mark.usefixtures("without_strings")
-def test_many_random_tasks_are_the_same_in_c(tmp_path) -> None:
-    check_tasks(1500, 600, 4, NativeCache(tmp_path / "cache"))
 
 
 @pytest.mark.usefixtures("without_strings")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from soaking import holds_for
 
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.types import DataType
@@ -43,7 +43,8 @@ def written(memory: CommonMemory) -> list[tuple[str, str, int, object]]:
     return [(entry.kind.name, memory.specs[entry.view].name, entry.element, bits(entry.value)) for entry in entries]
 
 
-def agree_with_interpreter(text: str, history) -> None:
+@holds_for(40, tasks(), HISTORY, soak=(3000, (tasks(4), HISTORY)))
+def test_compiled_tasks_do_what_the_interpreter_does(text, history) -> None:
     program = checked(text)
     task, memory = installed(program)
     model = Interpreter(program)
@@ -68,7 +69,8 @@ def compare(task: Task, memory: CommonMemory, model: Interpreter, record) -> Non
     model.writes.clear()
 
 
-def agree_in_both_forms(text: str, history) -> None:
+@holds_for(25, tasks(), HISTORY, soak=(1500, (tasks(4), HISTORY)))
+def test_both_forms_of_a_scan_agree(text, history) -> None:
     program = checked(text)
     (at_once, memory), (in_steps, other) = installed(program), installed(program)
     at_once.run(0)
@@ -86,7 +88,8 @@ def agree_in_both_forms(text: str, history) -> None:
         assert (in_steps.printed, in_steps.status) == (at_once.printed, at_once.status)
 
 
-def asking_changes_nothing(text: str, history) -> None:
+@holds_for(25, tasks(), HISTORY, soak=(1500, (tasks(4), HISTORY)))
+def test_asking_for_the_state_changes_nothing(text, history) -> None:
     """Between scans the compiled code holds the state: whether anybody looks must make no difference."""
     program = checked(text)
     (asked, memory), (left_alone, other) = installed(program), installed(program)
@@ -105,25 +108,13 @@ def asking_changes_nothing(text: str, history) -> None:
     assert (left_alone.printed, left_alone.status) == (asked.printed, asked.status)
 
 
-@given(tasks(), HISTORY)
-@repeatable(40)
-def test_compiled_tasks_do_what_the_interpreter_does(text, history):
-    agree_with_interpreter(text, history)
+FORCED = outside_writes().map(
+    lambda values: {name: value for name, value in values.items() if name[-1] in "%!@" and name[:-1].isalpha()}
+)
 
 
-@given(tasks(), HISTORY)
-@repeatable(25)
-def test_both_forms_of_a_scan_agree(text, history):
-    agree_in_both_forms(text, history)
-
-
-@given(tasks(), HISTORY)
-@repeatable(25)
-def test_asking_for_the_state_changes_nothing(text, history):
-    asking_changes_nothing(text, history)
-
-
-def forced_tasks_agree(text: str, history, forced: dict[str, object]) -> None:
+@holds_for(40, tasks(), HISTORY, FORCED, soak=(1500, (tasks(4), HISTORY, FORCED)))
+def test_forced_commons_keep_their_value_inside_a_scan_too(text, history, forced) -> None:
     """From the second scan on commons are forced, after the third no longer."""
     program = checked(text)
     (task, memory), (in_steps, other) = installed(program), installed(program)
@@ -157,45 +148,6 @@ def forced_tasks_agree(text: str, history, forced: dict[str, object]) -> None:
 
 def compare_states(one: Task, other: Task) -> None:
     assert list(map(bits, other.snapshot())) == list(map(bits, one.snapshot()))
-
-
-FORCED = outside_writes().map(
-    lambda values: {name: value for name, value in values.items() if name[-1] in "%!@" and name[:-1].isalpha()}
-)
-
-
-@given(tasks(), HISTORY, FORCED)
-@repeatable(40)
-def test_forced_commons_keep_their_value_inside_a_scan_too(text, history, forced):
-    forced_tasks_agree(text, history, forced)
-
-
-@pytest.mark.soak
-@given(tasks(4), HISTORY, FORCED)
-@repeatable(1500)
-def test_forced_commons_keep_their_value_inside_a_scan_too_long(text, history, forced):
-    forced_tasks_agree(text, history, forced)
-
-
-@pytest.mark.soak
-@given(tasks(4), HISTORY)
-@repeatable(3000)
-def test_compiled_tasks_do_what_the_interpreter_does_long(text, history):
-    agree_with_interpreter(text, history)
-
-
-@pytest.mark.soak
-@given(tasks(4), HISTORY)
-@repeatable(1500)
-def test_both_forms_of_a_scan_agree_long(text, history):
-    agree_in_both_forms(text, history)
-
-
-@pytest.mark.soak
-@given(tasks(4), HISTORY)
-@repeatable(1500)
-def test_asking_for_the_state_changes_nothing_long(text, history):
-    asking_changes_nothing(text, history)
 
 
 @given(tasks(), HISTORY, st.integers(0, 2))

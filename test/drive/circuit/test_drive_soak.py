@@ -6,6 +6,7 @@ from math import pi, radians
 from typing import NamedTuple
 
 import pytest
+from soaking import in_soak
 
 from automax_ros.drive.base.motor import FixedLoad
 from automax_ros.drive.circuit.ac_line import AcLine
@@ -61,12 +62,6 @@ def check(samples, blocks, circuit):
 
 
 @pytest.mark.parametrize("emf", [150.0, 300.0])
-def test_a_minute_at_constant_alpha(emf):
-    check(*run(emf, 1 / 60, 4))
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(3600)
-@pytest.mark.parametrize("emf", [150.0, 300.0])
-def test_a_day_at_constant_alpha(emf):
-    check(*run(emf, 24, 24))
+@pytest.mark.parametrize(("hours", "parts"), [(1 / 60, 4), in_soak(24, 24, timeout_s=3600)])
+def test_hours_at_constant_alpha(emf, hours, parts):
+    check(*run(emf, hours, parts))

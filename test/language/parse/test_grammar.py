@@ -7,6 +7,7 @@ from random import Random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from soaking import in_soak
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import PROBLEMS, Severity
@@ -74,19 +75,11 @@ def test_every_rule_and_token_is_used_and_known() -> None:
     assert named == (used | RULES.keys())
 
 
-def check_tasks(number: int) -> None:
+@pytest.mark.parametrize("number", [200, in_soak(20_000)])
+def test_every_task_of_the_grammar_is_read(number: int) -> None:
     for seed in range(number):
         text = text_of(tokens_of("task", Random(seed)))
         assert errors(text) == [], text
-
-
-def test_every_task_of_the_grammar_is_read() -> None:
-    check_tasks(200)
-
-
-@pytest.mark.soak
-def test_every_task_of_the_grammar_is_read_long() -> None:
-    check_tasks(20_000)
 
 
 @pytest.mark.parametrize("rule", STATEMENTS)
@@ -139,7 +132,8 @@ def is_beside_the_rules(tokens: list[str]) -> bool:
     return not tokens or split is not None or bool(OTHER_ANSWERS & set(tokens)) or repeats_a_key(tokens)
 
 
-def check_near_misses(number: int) -> None:
+@pytest.mark.parametrize("number", [500, in_soak(100_000)])
+def test_the_parser_refuses_what_the_grammar_does_not_allow_and_nothing_else(number: int) -> None:
     refused = 0
     for seed in range(number):
         tokens = near_miss(Random(seed))
@@ -148,10 +142,6 @@ def check_near_misses(number: int) -> None:
             refused += not allowed
             assert (errors(f"10 {' '.join(tokens)}") == []) is allowed, " ".join(tokens)
     assert refused > number / 3
-
-
-def test_the_parser_refuses_what_the_grammar_does_not_allow_and_nothing_else() -> None:
-    check_near_misses(500)
 
 
 def test_statements_of_basic_tasks_are_those_of_the_grammar() -> None:
@@ -172,11 +162,6 @@ def test_near_misses_of_statements_of_basic_tasks_are_refused() -> None:
             refused += not allowed
             assert (errors(f"10 {' '.join(tokens)}", "TASK.BAS") == []) is allowed, " ".join(tokens)
     assert refused > 130
-
-
-@pytest.mark.soak
-def test_the_parser_refuses_what_the_grammar_does_not_allow_and_nothing_else_long() -> None:
-    check_near_misses(100_000)
 
 
 @pytest.mark.parametrize(

@@ -84,11 +84,3 @@ def running(folder: Path, seconds: float = 0.5, **changes: str) -> Rack:
     rack.run(0.3 + seconds)
     assert rack.value("STATE@") is True
     return rack
-
-
-def edited(text: str, *changes: tuple[str, str]) -> str:
-    """Return a text with some pieces replaced, each of which must be there once."""
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    return text

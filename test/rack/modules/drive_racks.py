@@ -11,7 +11,7 @@ from automax_ros.drive.current_loop.signals import Command, Measured
 from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
-from rack.helpers import rack_at, run_for
+from rack.helpers import rack_from, run_for
 
 YAML = """\
 rack: PM1
@@ -48,9 +48,7 @@ INPUTS = Inputs(
 
 def built(folder: Path, *, yaml: str = YAML, plant: str = "", task: str = IDLE) -> Rack:
     """Return a rack that was not started."""
-    (folder / "IDLE.BLK").write_text(task)
-    (folder / "rack.yaml").write_text(yaml.replace(", PLANT", f", {plant}" if plant else ""))
-    return rack_at(folder / "rack.yaml")
+    return rack_from(folder, yaml.replace(", PLANT", f", {plant}" if plant else ""), IDLE=task)
 
 
 def controller(rack: Rack, slot: int = 7) -> DriveControllerModule:

@@ -7,7 +7,7 @@ from pathlib import Path
 from automax_ros.drive.plant.plant import RAD_S_PER_RPM, DrivePlant
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from rack.helpers import rack_at, run_for
+from rack.helpers import rack_at, run_for, written_in
 
 YAML = """\
 rack: PM1
@@ -81,10 +81,7 @@ IDLE = "10 CALL SCAN_LOOP(TICKS=4)\n20 END\n"
 
 def written(folder: Path, source: str = SPEED_LOOP, *, plant: str = "inertia: 3.0", points: str = "") -> Path:
     """Write the rack with a source of WIND_A."""
-    (folder / "IDLE.BLK").write_text(IDLE)
-    (folder / "WIND_A.BLK").write_text(source)
-    (folder / "rack.yaml").write_text(YAML.replace("PLANT", plant) + points)
-    return folder / "rack.yaml"
+    return written_in(folder, YAML.replace("PLANT", plant) + points, IDLE=IDLE, WIND_A=source)
 
 
 def built(folder: Path, source: str = SPEED_LOOP, *, plant: str = "inertia: 3.0", points: str = "") -> Rack:

@@ -10,7 +10,7 @@ import pytest
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.drive.pmi import registers as table
 from automax_ros.rack.rack import Rack, RackState
-from rack.helpers import rack_at, run_for
+from rack.helpers import rack_from, run_for
 from rack.modules.pmi_racks import CURRENT, IDLE, SPEED_LOOP, breaks, built, rpm, started, winder
 
 BASE_RPM = 1750
@@ -312,10 +312,7 @@ ONE_TASK = "10 COMMON CCLK@\n20 CCLK@ = TRUE\n100 CALL SCAN_LOOP(TICKS=4)\n900 E
 
 def test_both_drives_have_registers_and_currents_of_their_own(tmp_path):
     """Drive B has no task of its own: that of A commands it, or here somebody from outside while A's scans."""
-    (tmp_path / "IDLE.BLK").write_text(IDLE)
-    (tmp_path / "WIND_A.BLK").write_text(ONE_TASK)
-    (tmp_path / "rack.yaml").write_text(BOTH)
-    rack = run_for(rack_at(tmp_path / "rack.yaml"), 0.4)
+    rack = run_for(rack_from(tmp_path, BOTH, IDLE=IDLE, WIND_A=ONE_TASK), 0.4)
     rack.write("RUN_A@", True)
     rack.write("RUN_B@", True)
     rack.write("REF_A%", 2730)

@@ -15,8 +15,8 @@ from automax_ros.rack.operator.retention import Retention
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.memory.views import MemoryValueError
 from automax_ros.scenario.report import report_of
+from rack.helpers import Told
 from rack.modules.udc_racks import built as udc_rack
-from rack.operator.test_requests import Told
 
 YAML = """\
 rack: LINE1

@@ -14,9 +14,9 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.memory.views import MemoryValueError
 from automax_ros.runtime.tasks.task import Status
+from rack.helpers import config_at, rack_from
 
 YAML = """\
 rack: LINE1
@@ -76,12 +76,7 @@ class Notes:
 
 
 def build(folder: Path, *, yaml: str = YAML, **sources: str) -> tuple[Rack, Notes]:
-    for name, text in {**SOURCES, **sources}.items():
-        (folder / f"{name}.BLK").write_text(text)
-    (folder / "rack.yaml").write_text(yaml)
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    rack, notes = Rack(result.config), Notes()
+    rack, notes = rack_from(folder, yaml, **{**SOURCES, **sources}), Notes()
     rack.observe(notes)
     return rack, notes
 
@@ -486,8 +481,7 @@ def test_a_state_is_refused_by_a_rack_that_runs_or_has_other_modules(made, tmp_p
         "  LAMP@: {slot: 6, register: 0, bit: 1}\n", "  LAMP@:\n"
     )
     (tmp_path / "other.yaml").write_text(other.replace("  LAMPS%: {slot: 6, register: 0}\n", ""))
-    config = load(tmp_path / "other.yaml").config
-    assert config is not None
+    config = config_at(tmp_path / "other.yaml")
     with pytest.raises(ValueError, match="other modules"):
         Rack(config).load(rack.state())
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 from recordings.live_racks import build
+from runtime.time.walls import Wall
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.base.observers import Operation
@@ -13,6 +12,7 @@ from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operator.halting import DONE, STOPPED, TIME_OVER, Halting, Stepped
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.time.pacer import Pacer
+from rack.helpers import Told
 
 YAML = """\
 rack: LINE1
@@ -31,32 +31,6 @@ TASKS = {
     "OTHER": "10 COMMON COUNT!, STUCK@\n20 LOCAL HERE!\n100 CALL SCAN_LOOP(TICKS=3)\n"
     "110 HERE! = COUNT!\n120 IF STUCK@ THEN GOTO 120\n130 END\n",
 }
-
-
-class Wall:
-    """A wall clock that moves when somebody waits."""
-
-    def __init__(self) -> None:
-        self.now_ns = 7 * NS_PER_S
-
-    def __call__(self) -> int:
-        return self.now_ns
-
-    def wait(self, seconds: float) -> None:
-        self.now_ns += round(seconds * NS_PER_S)
-
-
-class Told:
-    """Notes operations; everything else goes by."""
-
-    def __init__(self) -> None:
-        self.operations: list[Operation] = []
-
-    def operated(self, operation: Operation) -> None:
-        self.operations.append(operation)
-
-    def __getattr__(self, _: str) -> Any:
-        return lambda *_: None
 
 
 @pytest.fixture

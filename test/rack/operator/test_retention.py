@@ -12,6 +12,7 @@ from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operator.retention import Restored, Retention, RetentionFault, default_folder
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
+from rack.helpers import Observer, written_in
 
 RACK = """\
 rack: KEEP
@@ -47,8 +48,7 @@ VALUES = {"COUNT%": 120, "WIDE!": -70000, "GAIN": 0.1, "ON@": False, "TEXT$": "G
 
 @pytest.fixture
 def folder(tmp_path):
-    (tmp_path / "rack.yaml").write_text(RACK)
-    (tmp_path / "T.BLK").write_text(TASK)
+    written_in(tmp_path, RACK, T=TASK)
     return tmp_path
 
 
@@ -115,16 +115,11 @@ def test_restored_values_are_in_the_log_of_writes(folder):
     rack, retention = made(folder)
     writes = []
 
-    class Observer:
+    class Notes(Observer):
         def written(self, entries):
             writes.extend(entry for group in entries for entry in group.entries())
 
-        def scanned(self, *_):
-            pass
-
-        tuned = all_stopped = scanned
-
-    rack.observe(Observer())
+    rack.observe(Notes())
     rack.start(retention.restore().settings)
     last = {(write.view, write.element): write.value for write in writes}
     assert last[rack.memory.view("COUNT%"), 0] == 120
@@ -229,8 +224,7 @@ def test_with_auto_run_those_tasks_run_that_ran(folder, auto_run):
 
 
 def test_auto_run_starts_nothing_after_a_fault(folder):
-    (folder / "V.BLK").write_text(FAULTY)
-    (folder / "rack.yaml").write_text(AUTO)
+    written_in(folder, AUTO, V=FAULTY)
     rack, retention, _ = begun(folder)
     rack.run(0.06)
     assert statuses(rack) == ["STOPPED", "STOPPED", "FAULTED"]
@@ -334,8 +328,7 @@ def test_folder_that_cannot_be_written_is_told(folder):
 @given(data=st.data())
 def test_any_change_of_the_file_is_read_or_refused(tmp_path_factory, data):
     folder: Path = tmp_path_factory.mktemp("rack")
-    (folder / "rack.yaml").write_text(RACK)
-    (folder / "T.BLK").write_text(TASK)
+    written_in(folder, RACK, T=TASK)
     changed(folder)
     path = folder / "state" / "state.json"
     text = bytearray(path.read_bytes())
@@ -363,8 +356,7 @@ PARTS = RACK.replace(
 
 
 def test_each_process_of_a_rack_keeps_what_is_its_own(folder):
-    (folder / "rack.yaml").write_text(PARTS)
-    (folder / "U.BLK").write_text("10 LOCAL OWN%\n100 CALL SCAN_LOOP(TICKS=1)\n110 OWN% = OWN% + 1\n120 END\n")
+    written_in(folder, PARTS, U="10 LOCAL OWN%\n100 CALL SCAN_LOOP(TICKS=1)\n110 OWN% = OWN% + 1\n120 END\n")
     kept = {}
     for slot in (0, 1, 2):
         rack = Rack(load(folder / "rack.yaml").config, local={slot})

@@ -8,8 +8,8 @@ import pytest
 from automax_ros.core.types import Value
 from automax_ros.rack.operator.retention import Retention
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status
+from rack.helpers import rack_at, rack_from
 
 YAML = """\
 rack: KEEP
@@ -218,13 +218,7 @@ CELLS: dict[str, tuple[Callable[[Rack], object], object, object, object, object,
 
 
 def made(folder: Path) -> tuple[Rack, Retention]:
-    (folder / "LINE.BLK").write_text(LINE)
-    (folder / "BREAK.BLK").write_text(BREAK)
-    (folder / "DRIVE.BLK").write_text(DRIVE)
-    (folder / "rack.yaml").write_text(YAML)
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    rack = Rack(result.config)
+    rack = rack_from(folder, YAML, LINE=LINE, BREAK=BREAK, DRIVE=DRIVE)
     retention = Retention(rack, folder / "state")
     rack.start()
     rack.run(0.021)
@@ -265,9 +259,7 @@ def test_all_of_it_survives_the_process_as_it_survives_power(tmp_path, way):
     rack, retention = made(tmp_path)
     WAYS[way](rack)
     assert retention.save()
-    result = load(tmp_path / "rack.yaml")
-    assert result.config is not None
-    again = Rack(result.config)
+    again = rack_at(tmp_path / "rack.yaml")
     again.start(Retention(again, tmp_path / "state").restore().settings)
     index = list(WAYS).index(way)
     for what, (read, _, *after) in CELLS.items():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from recordings.live_racks import build
@@ -13,6 +12,7 @@ from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.modules.module import QuietModule
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
+from rack.helpers import Told
 
 YAML = """\
 rack: LINE1
@@ -32,19 +32,6 @@ class Panel(QuietModule):
         if verb == "fault_reset_switch":
             raise OperationRefused("the switch is stuck")
         self.moved = (*getattr(self, "moved", ()), (verb, value))
-
-
-class Told:
-    """Notes operations; everything else goes by."""
-
-    def __init__(self) -> None:
-        self.operations: list[Operation] = []
-
-    def operated(self, operation: Operation) -> None:
-        self.operations.append(operation)
-
-    def __getattr__(self, _: str) -> Any:
-        return lambda *_: None
 
 
 @pytest.fixture

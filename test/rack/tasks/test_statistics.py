@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from recordings.live_racks import build
+from runtime.time.walls import Wall
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.rack import Rack
@@ -48,24 +49,18 @@ def test_counts_and_times_of_each_window_and_of_all(windows) -> None:
     assert statistics.last_ns == next((scan[0] for scan in reversed(everything)), 0)
 
 
-class Host:
+class Host(Wall):
     """A clock that stands where it is told to; its stopwatch finds that each scan takes 0.4 ms."""
 
     def __init__(self) -> None:
-        self.now_ns = 5 * NS_PER_S
+        super().__init__()
         self.looks = 0
-
-    def __call__(self) -> int:
-        return self.now_ns
 
     def stopwatch(self) -> int:
         self.looks += 1
         if self.looks % 2 == 0:
             self.now_ns += 400_000
         return self.now_ns
-
-    def wait(self, seconds: float) -> None:
-        self.now_ns += round(seconds * NS_PER_S)
 
 
 def test_execution_and_lateness_are_those_of_the_host(tmp_path) -> None:

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
+from rack.helpers import config_at
 
 from automax_ros.rackfile.checks.tasks import check_tasks, forgotten
-from automax_ros.rackfile.loader import load
 
 CONFIG = Path(__file__).parents[3] / "config"
 RACK = """\
@@ -31,8 +31,7 @@ def found(folder: Path, common: str, one: str = "", two: str = "", log: str = ""
         (folder / f"{name}.BLK").write_text(source if declared else source.replace("10 COMMON NONE%\n", ""))
     (folder / "LOG.BAS").write_text(log or "10 LOCAL X%\n20 X% = 1\n30 END\n")
     (folder / "rack.yaml").write_text(RACK + "".join(f"  {line}\n" for line in common.split("; ")))
-    config = load(folder / "rack.yaml").config
-    assert config is not None, load(folder / "rack.yaml").diagnostics
+    config = config_at(folder / "rack.yaml")
     tasks = check_tasks(config)
     assert all(item.result.program is not None for item in tasks), [item.result.diagnostics for item in tasks]
     items = [item for task in tasks for item in task.result.diagnostics] + forgotten(config, tasks)
@@ -50,35 +49,36 @@ def test_both_places_of_two_writers_are_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("common", "one", "two", "log"),
+    ("common", "one", "two", "log", "code"),
     [
-        ("A%: {}", "A%: A% = 1", "A%: OWN% = A%", ""),
-        ("T%(5): {}", "T%(5): T%(1) = 1", "T%(5): T%(2) = OWN%", ""),
-        ("T%(5): {}", "T%(5): T%(1) = 1", "T%(5): T%(I%) = OWN%", ""),
-        ("REQUEST@: {}", "REQUEST@: IF OWN@ THEN REQUEST@ = TRUE", "REQUEST@: REQUEST@ = FALSE", ""),
-        ("A%: {}", "A%: A% = 1", "", "10 COMMON A%\n20 A% = 7\n30 END\n"),
+        ("T%(5): {}", "T%(5): T%(2) = 1", "T%(5): T%(2) = OWN%", "", "AMX6495"),
+        ("REQUEST@: {}", "REQUEST@: REQUEST@ = OWN@", "REQUEST@: REQUEST@ = FALSE", "", "AMX6495"),
+        ("A%: {}", "A%: A% = 1", "", "10 COMMON A%\n20 A% = 7\n30 GOTO 20\n40 END\n", "AMX6495"),
+        ("A%: {}", "A%: A% = 1", "", "10 COMMON A%\n20 START EVERY 1 SECONDS\n30 A% = 7\n40 END\n", "AMX6495"),
+        ("LAMP%: {slot: 6, register: 0}", "LAMP%: LAMP% = 1", "LAMP%: LAMP% = OWN%", "", "AMX6495"),
+        # No false alarm of two writers.
+        ("A%: {}", "A%: A% = 1", "A%: OWN% = A%", "", None),
+        ("T%(5): {}", "T%(5): T%(1) = 1", "T%(5): T%(2) = OWN%", "", None),
+        ("T%(5): {}", "T%(5): T%(1) = 1", "T%(5): T%(I%) = OWN%", "", None),
+        ("REQUEST@: {}", "REQUEST@: IF OWN@ THEN REQUEST@ = TRUE", "REQUEST@: REQUEST@ = FALSE", "", None),
+        ("A%: {}", "A%: A% = 1", "", "10 COMMON A%\n20 A% = 7\n30 END\n", None),
+        # What is read and somebody writes.
+        ("A%: {ros: in}", "A%: OWN% = A%", "", "", None),
+        ("A%: {preset: 0}", "A%: OWN% = A%", "", "", None),
+        ("A%: {slot: 5, register: 0}", "A%: OWN% = A%", "", "", None),
+        ("A%: {slot: 6, register: 0}", "A%: OWN% = A%", "", "", None),
+        ("FORCINGSTATUS@: {}", "FORCINGSTATUS@: OWN@ = FORCINGSTATUS@", "", "", None),
+        ("A%: {}", "A%: OWN% = A%", "A%: A% = 3", "", None),
+        ("T%(3): {}", "T%(3): OWN% = T%(1)", "T%(3): T%(I%) = 3", "", None),
     ],
 )
-def test_no_false_alarm_of_two_writers(tmp_path, common, one, two, log):
-    assert codes(tmp_path, common, one, two, log) == []
+def test_two_writers_and_none(tmp_path, common, one, two, log, code):
+    assert codes(tmp_path, common, one, two, log) == ([code] if code else [])
 
 
-def test_what_stands_before_scan_loop_initialises(tmp_path):
-    assert codes(tmp_path, "A%: {}", "A%: A% = 1", "A%: OWN% = A%", two_first="A% = 5") == []
-
-
-@pytest.mark.parametrize(
-    ("common", "one", "two", "log"),
-    [
-        ("T%(5): {}", "T%(5): T%(2) = 1", "T%(5): T%(2) = OWN%", ""),
-        ("REQUEST@: {}", "REQUEST@: REQUEST@ = OWN@", "REQUEST@: REQUEST@ = FALSE", ""),
-        ("A%: {}", "A%: A% = 1", "", "10 COMMON A%\n20 A% = 7\n30 GOTO 20\n40 END\n"),
-        ("A%: {}", "A%: A% = 1", "", "10 COMMON A%\n20 START EVERY 1 SECONDS\n30 A% = 7\n40 END\n"),
-        ("LAMP%: {slot: 6, register: 0}", "LAMP%: LAMP% = 1", "LAMP%: LAMP% = OWN%", ""),
-    ],
-)
-def test_two_writers(tmp_path, common, one, two, log):
-    assert codes(tmp_path, common, one, two, log) == ["AMX6495"]
+@pytest.mark.parametrize(("one", "two"), [("A% = 1", "OWN% = A%"), ("OWN% = A%", "")])
+def test_what_stands_before_scan_loop_is_a_first_value(tmp_path, one, two):
+    assert codes(tmp_path, "A%: {}", f"A%: {one}", f"A%: {two}", two_first="A% = 5") == []
 
 
 def test_what_is_read_and_never_written_is_named_with_its_reader(tmp_path):
@@ -86,26 +86,6 @@ def test_what_is_read_and_never_written_is_named_with_its_reader(tmp_path):
         "AMX6496 9 A% is read in line 110 of ONE.BLK, and no task writes it: it stays 0"
     ]
     assert found(tmp_path, "A@: {}", "A@: CALL OR(INPUT1=A@, OUTPUT=OWN@)")[0].endswith("it stays FALSE")
-
-
-@pytest.mark.parametrize(
-    ("common", "one", "two"),
-    [
-        ("A%: {ros: in}", "A%: OWN% = A%", ""),
-        ("A%: {preset: 0}", "A%: OWN% = A%", ""),
-        ("A%: {slot: 5, register: 0}", "A%: OWN% = A%", ""),
-        ("A%: {slot: 6, register: 0}", "A%: OWN% = A%", ""),
-        ("FORCINGSTATUS@: {}", "FORCINGSTATUS@: OWN@ = FORCINGSTATUS@", ""),
-        ("A%: {}", "A%: OWN% = A%", "A%: A% = 3"),
-        ("T%(3): {}", "T%(3): OWN% = T%(1)", "T%(3): T%(I%) = 3"),
-    ],
-)
-def test_what_somebody_writes(tmp_path, common, one, two):
-    assert codes(tmp_path, common, one, two) == []
-
-
-def test_a_first_value_before_scan_loop_is_a_write(tmp_path):
-    assert codes(tmp_path, "A%: {}", "A%: OWN% = A%", two="A%: ", two_first="A% = 5") == []
 
 
 def test_one_warning_for_all_commons_that_no_task_uses(tmp_path):
@@ -120,15 +100,13 @@ def test_one_warning_for_all_commons_that_no_task_uses(tmp_path):
 def test_nothing_is_said_to_be_forgotten_while_a_task_has_errors(tmp_path):
     found(tmp_path, "A%: {}; B%: {}", "A%: OWN% = A%")
     (tmp_path / "TWO.BLK").write_text("10 NONSENSE\n")
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
+    config = config_at(tmp_path / "rack.yaml")
     assert forgotten(config, check_tasks(config)) == []
 
 
 @pytest.mark.parametrize("path", sorted(CONFIG.rglob("rack.yaml")), ids=lambda path: path.parent.name)
 def test_example_racks_are_free_of_them(path):
-    config = load(path).config
-    assert config is not None
+    config = config_at(path)
     tasks = check_tasks(config)
     items = [item for task in tasks for item in task.result.diagnostics] + forgotten(config, tasks)
     assert [item.code for item in items if item.code.startswith("AMX649")] == []

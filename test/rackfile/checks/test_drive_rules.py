@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import pytest
-from rack.drives.drive_tasks import CML, YAML, edited, folder_of
+from rack.drives.drive_tasks import CML, YAML, folder_of
+from rack.helpers import config_at
+from replay.replays import edited
 
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.loader import load
 
 
 def found(folder, **changes):
     """Code, task, line and message of what the rack has against its tasks."""
-    result = load(folder_of(folder, **changes))
-    assert result.config is not None, result.diagnostics
+    config = config_at(folder_of(folder, **changes))
     return [
         (item.code, task.name, item.span.line, item.message, item.hint)
-        for task, _, checked in check_tasks(result.config)
+        for task, _, checked in check_tasks(config)
         for item in checked.diagnostics
     ]
 

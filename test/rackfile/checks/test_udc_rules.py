@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from rack.helpers import config_at
 from rack.modules.udc_racks import written
 
 from automax_ros.rackfile.checks.tasks import check_tasks
@@ -27,8 +28,7 @@ def task(commons: str = "FB%, TRIP@", scan: str = "", *, ticks: int = 2, lim: st
 def found(folder, points: str = "", *, tasks: str = "WIND_A: {drive: A}", **sources: str) -> list[tuple[str, str]]:
     """Return the names of tasks and the codes of what is wrong with them."""
     path = written(folder, POINTS + points, tasks=tasks, **sources)
-    config = load(path).config
-    assert config is not None, load(path).diagnostics
+    config = config_at(path)
     return [(item.task.name, one.code) for item in check_tasks(config) for one in item.result.diagnostics]
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rack.helpers import rack_at, written_in
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
@@ -42,9 +43,7 @@ PANEL = """\
 
 
 def written(folder: Path, points: str, panel: str = "10 CALL SCAN_LOOP(TICKS=1)\n20 END\n") -> Path:
-    (folder / "PANEL.BLK").write_text(panel)
-    (folder / "rack.yaml").write_text(HEAD + points)
-    return folder / "rack.yaml"
+    return written_in(folder, HEAD + points, PANEL=panel)
 
 
 def codes(folder: Path, points: str) -> list[str]:
@@ -52,9 +51,7 @@ def codes(folder: Path, points: str) -> list[str]:
 
 
 def built(folder: Path, points: str, panel: str) -> Rack:
-    config = load(written(folder, points, panel)).config
-    assert config is not None
-    return Rack(config)
+    return rack_at(written(folder, points, panel))
 
 
 @given(st.lists(st.integers(-32768, 32767), min_size=1, max_size=4))

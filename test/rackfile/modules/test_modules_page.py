@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
+from rack.helpers import config_at, written_in
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.module import Registers
 from automax_ros.rackfile.modules.registry import KINDS
 
@@ -51,9 +51,7 @@ def test_every_period_and_status_register_of_an_interrupt_is_an_output(model):
 
 def test_the_example_scans_every_22_ms(tmp_path):
     task, rack_file = (re.search(rf"```{word}[^\n]*\n(.*?)```", PAGE, re.S)[1] for word in ("blk", "yaml"))
-    (tmp_path / "SPEED.BLK").write_text(task)
-    (tmp_path / "rack.yaml").write_text(rack_file)
-    config = load(tmp_path / "rack.yaml").config
+    config = config_at(written_in(tmp_path, rack_file, SPEED=task))
     assert [item.result.diagnostics for item in check_tasks(config)] == [[]]
     rack = Rack(config)
     rack.start()

@@ -8,12 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from rack.helpers import HEAD, codes, common
+from rack.helpers import HEAD, codes, common, rack_from
 
 from automax_ros.messages.cdr.cdr import decode
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.reading.scale import Scale
 
 COUNTS = st.integers(-32768, 32767)
@@ -85,11 +83,11 @@ def test_a_scale_is_part_of_the_configuration(tmp_path):
 
 
 def test_the_topic_is_in_the_engineers_unit_and_memory_in_counts(tmp_path: Path):
-    (tmp_path / "LINE.BLK").write_text("10 COMMON A%\n20 CALL SCAN_LOOP(TICKS=1)\n30 A% = A% + 1024\n40 END\n")
-    (tmp_path / "rack.yaml").write_text(f"{HEAD}common:\n  A%: {{scale: {{counts: [0, 4096], value: [-1.0, 1.0]}}}}\n")
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_from(
+        tmp_path,
+        f"{HEAD}common:\n  A%: {{scale: {{counts: [0, 4096], value: [-1.0, 1.0]}}}}\n",
+        LINE="10 COMMON A%\n20 CALL SCAN_LOOP(TICKS=1)\n30 A% = A% + 1024\n40 END\n",
+    )
     stream = RackStream(rack, 1)
     values: list[float] = []
     kinds = {topic.name: topic.type_name for topic in stream.topics}

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rack.helpers import good, loaded
+from rack.helpers import Observer, good, loaded
 
 from automax_ros.core.kinds import WriterKind
 from automax_ros.rack.operator.switches import SwitchOperations
@@ -46,7 +46,7 @@ def rack_of(folder: Path, feeds: str, **options: str) -> Rack:
     return rack
 
 
-class Log:
+class Log(Observer):
     """All writes that somebody is told of."""
 
     def __init__(self, rack: Rack) -> None:
@@ -60,10 +60,6 @@ class Log:
 
     def scanned(self, _task, _record, writes) -> None:
         self.written(writes)
-
-    def tuned(self, *_) -> None: ...
-
-    def operated(self, _) -> None: ...
 
 
 def test_signals_reach_every_kind_of_number(tmp_path):

@@ -19,6 +19,7 @@ from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
+from soaking import in_soak
 
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.ticks import NS_PER_S
@@ -344,32 +345,25 @@ def flipped(data: bytes, position: int, bit: int) -> bytes:
     return bytes(mutant)
 
 
-def check_flips(folder: Path, data: bytes, count: int, seed: int) -> None:
+@pytest.mark.parametrize(("count", "seed"), [(60, 1), in_soak(4000, 2)])
+def test_every_flipped_bit_is_noticed(tmp_path: Path, recording: Path, count: int, seed: int) -> None:
     """Any single bit that changes is noticed: everything is under a checksum."""
-    chance = random.Random(seed)
+    data, chance = data_of(recording), random.Random(seed)
     for _ in range(count):
         position, bit = chance.randrange(len(data)), chance.randrange(8)
         mutant = flipped(data, position, bit)
         with pytest.raises(BagError):
-            read_bytes(folder, mutant)
+            read_bytes(tmp_path, mutant)
 
 
-def test_every_flipped_bit_is_noticed(tmp_path: Path, recording: Path) -> None:
-    check_flips(tmp_path, data_of(recording), 60, seed=1)
-
-
-@pytest.mark.soak
-def test_every_flipped_bit_is_noticed_in_many_places(tmp_path: Path, recording: Path) -> None:
-    check_flips(tmp_path, data_of(recording), 4000, seed=2)
-
-
-def check_garbled(folder: Path, count: int, seed: int) -> None:
+@pytest.mark.parametrize(("count", "seed"), [(60, 3), in_soak(8000, 4)])
+def test_garbled_files_without_checksums(tmp_path: Path, count: int, seed: int) -> None:
     """Without checksums damage may pass, but only as messages or as BagError."""
     chance = random.Random(seed)
     compressions = list(CompressionType)
     for number in range(count):
         options = {"compression": compressions[number % 3], "use_chunking": number % 5 > 0, "enable_crcs": False}
-        data = bytearray(foreign(folder / "a.mcap", **options).read_bytes())
+        data = bytearray(foreign(tmp_path / "a.mcap", **options).read_bytes())
         for _ in range(chance.randrange(1, 6)):
             start = chance.randrange(len(data))
             junk = chance.choice((b"\xff" * 8, b"\0" * 8, bytes([chance.randrange(256)]), struct.pack("<Q", 2**40)))
@@ -377,16 +371,7 @@ def check_garbled(folder: Path, count: int, seed: int) -> None:
         if chance.random() < 0.2:
             del data[chance.randrange(len(data)) :]
         with contextlib.suppress(BagError):
-            read_bytes(folder, bytes(data))
-
-
-def test_garbled_files_without_checksums(tmp_path: Path) -> None:
-    check_garbled(tmp_path, 60, seed=3)
-
-
-@pytest.mark.soak
-def test_many_garbled_files_without_checksums(tmp_path: Path) -> None:
-    check_garbled(tmp_path, 8000, seed=4)
+            read_bytes(tmp_path, bytes(data))
 
 
 def record_of(opcode: int, content: bytes) -> bytes:

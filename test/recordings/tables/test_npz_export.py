@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rack.helpers import config_at
 
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.messages.types.messages import Scan, Values
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.info.info import bag_info
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.tables import export_npz, series
@@ -192,8 +192,7 @@ def test_a_grid_goes_on_to_the_end_of_the_run(tmp_path: Path) -> None:
 
 
 def test_a_split_recording_gives_the_same_tables(tmp_path: Path) -> None:
-    config = load(ROOT / "config" / "section_drive" / "rack.yaml").config
-    assert config is not None
+    config = config_at(ROOT / "config" / "section_drive" / "rack.yaml")
     for name, split_ns in (("whole", 0), ("split", 700 * MS)):
         rack = Rack(config)
         stream = RackStream(rack, rack.fingerprint)

@@ -7,11 +7,11 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from waiting import wait_until
 
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.common_log import Cell
@@ -98,10 +98,7 @@ def test_a_signal_takes_the_half_file_away(tmp_path: Path, bag: Path, number: si
     command = [sys.executable, "-c", f"{heard}\n{ENDLESS}", "export", str(bag), "-o", str(tmp_path / "OUT.csv")]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     try:
-        end = time.monotonic() + 240
-        while not any(path.stat().st_size for path in tmp_path.iterdir()) and time.monotonic() < end:
-            time.sleep(0.02)
-        assert list(tmp_path.iterdir())
+        wait_until(lambda: any(path.stat().st_size for path in tmp_path.iterdir()))
         assert not (tmp_path / "OUT.csv").exists()
         process.send_signal(number)
         assert (process.wait(240), list(tmp_path.iterdir())) == (code, [])

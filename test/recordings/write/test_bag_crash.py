@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from soaking import in_soak
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.messages.cdr.cdr import decode
@@ -105,10 +106,11 @@ def moments(first: int, last: int) -> Iterator[tuple[float, list[str]]]:
             yield seconds, OPTIONS[number % len(OPTIONS)]
 
 
-def assert_moments(folder: Path, first: int, last: int) -> None:
+@pytest.mark.parametrize(("first", "last"), [(0, QUICK), in_soak(QUICK, ALL, timeout_s=1800)])
+def test_killed_at_any_moment(tmp_path: Path, first: int, last: int) -> None:
     kept: list[RepairReport] = []
     for number, (seconds, options) in enumerate(moments(first, last)):
-        here = folder / f"run{number}"
+        here = tmp_path / f"run{number}"
         here.mkdir()
         end = killed_after(here, seconds, "--simulated", "--duration", "1000000", *options)
         report = assert_little_is_lost(here / "bag", end)
@@ -117,16 +119,6 @@ def assert_moments(folder: Path, first: int, last: int) -> None:
     smallest = min(kept, key=lambda report: report.files[0].contents.messages).output
     assert smallest is not None
     assert len(rosbags_messages(smallest)) == sum(map(assert_mcap_reads, smallest.glob("*.mcap")))
-
-
-def test_killed_at_a_few_moments(tmp_path: Path) -> None:
-    assert_moments(tmp_path, 0, QUICK)
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(1800)
-def test_killed_at_many_moments(tmp_path: Path) -> None:
-    assert_moments(tmp_path, QUICK, ALL)
 
 
 @pytest.mark.usefixtures("ros_domain_id")

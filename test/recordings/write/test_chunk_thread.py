@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from waiting import wait_until
 
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import Int16, String
@@ -102,10 +103,7 @@ def test_the_thread_ends_with_its_object_and_with_the_writer(tmp_path: Path) -> 
         channel = writer.channel("/a", INT16, VALUE)
         for number in range(4):
             writer.write(channel, number * HALF, encode(Int16(number)))
-    end = time.monotonic() + 240
-    while recording_threads() > before:
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    wait_until(lambda: recording_threads() <= before)
 
 
 def test_a_chunk_that_fails_on_the_thread_is_an_error_of_the_writer(

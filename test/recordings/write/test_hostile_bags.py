@@ -10,6 +10,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from soaking import in_soak
 
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.messages.stream.stream import RackStream
@@ -42,12 +43,15 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "bag"
 
 
-def assert_survived(sound: Path, work: Path, count: int, seed: int) -> None:
+@pytest.mark.parametrize(
+    ("count", "seed"), [(MUTANTS, 1), *(in_soak(500, seed, timeout_s=3600) for seed in range(2, 12))]
+)
+def test_hostile_recordings(sound: Path, tmp_path: Path, count: int, seed: int) -> None:
     """Let all commands read this many mutants in a process of their own."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "test")])}
     driver = [sys.executable, str(Path(__file__).with_name("hostile_driver.py"))]
     ended = subprocess.run(
-        [*driver, str(sound), str(work), str(count), str(seed)],
+        [*driver, str(sound), str(tmp_path), str(count), str(seed)],
         env=environment,
         capture_output=True,
         text=True,
@@ -65,15 +69,3 @@ def assert_survived(sound: Path, work: Path, count: int, seed: int) -> None:
     for name, counted in codes.items():
         assert counted[1] + counted[2], f"{name} refuses none: the mutants are not hostile"
         assert counted[0], f"{name} reads none: the mutants are not near enough to a recording"
-
-
-@pytest.mark.timeout(300)
-def test_hostile_recordings(sound: Path, tmp_path: Path) -> None:
-    assert_survived(sound, tmp_path, MUTANTS, 1)
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(3600)
-@pytest.mark.parametrize("seed", range(2, 12))
-def test_more_hostile_recordings(sound: Path, tmp_path: Path, seed: int) -> None:
-    assert_survived(sound, tmp_path, 500, seed)

@@ -8,14 +8,15 @@ from typing import Any
 
 import pytest
 from mcap.reader import make_reader
+from rack.helpers import config_at
 from replay.reexecution import Reexecution
+from replay.replays import record
 from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import automax_ros
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.mcap.errors import BagError, RecordingError
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.soundness import verdict_of
@@ -24,22 +25,6 @@ from automax_ros.replay.engine import replay
 from recordings.live_racks import SPEED, WORK, YAML, build
 
 ROOT = Path(__file__).parents[3]
-
-
-def recorded(rack: Rack, bag: Path, steps: Any = None, seconds: float = 1.0) -> Path:
-    """Record a run; ``steps`` does something to the rack 20 times on the way."""
-    stream = RackStream(rack, rack.fingerprint)
-    recorder = Recorder(rack, stream, bag)
-    stream.begin()
-    rack.start()
-    for number in range(20):
-        if steps is not None:
-            steps(rack, number)
-        rack.run(seconds / 20)
-    stream.end()
-    recorder.close()
-    assert recorder.failure is None
-    return bag
 
 
 def play(rack: Rack, number: int) -> None:
@@ -61,7 +46,7 @@ def files(bag: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def busy(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("busy")
-    return recorded(build(folder), folder / "bag", play, seconds=25.0)
+    return record(build(folder), folder / "bag", play, seconds=25.0)
 
 
 def test_every_scan_executes_again_to_the_same_result(busy, tmp_path):
@@ -90,9 +75,8 @@ def test_reexecution_notices_another_program(busy, tmp_path, monkeypatch):
 
 
 def test_example_rack_executes_again(tmp_path):
-    config = load(ROOT / "config" / "section_drive" / "rack.yaml").config
-    assert config is not None
-    bag = recorded(Rack(config), tmp_path / "bag", seconds=12.0)
+    config = config_at(ROOT / "config" / "section_drive" / "rack.yaml")
+    bag = record(Rack(config), tmp_path / "bag", seconds=12.0)
     (tmp_path / "again").mkdir()
     outcome = Reexecution(bag, tmp_path / "again").execute()
     assert set(outcome.scans) == {task.name for module in config.task_modules for task in module.tasks}
@@ -101,7 +85,7 @@ def test_example_rack_executes_again(tmp_path):
 
 def test_stop_all_is_recorded_to_the_end(tmp_path):
     rack = build(tmp_path, SPEED=SPEED.replace("LAST% = LAST% / NIL%", "140"))
-    bag = recorded(rack, tmp_path / "bag", lambda made, number: made.write("RUN@", number == 3))
+    bag = record(rack, tmp_path / "bag", lambda made, number: made.write("RUN@", number == 3), seconds=1.0)
     assert rack.stop_reason is not None
     scans = [item.message for item in BagReader(bag).messages(topics={"/line1/scans"})]
     (last,) = (scan for scan in scans if scan.errors)
@@ -115,7 +99,7 @@ def test_same_run_gives_the_same_bytes_in_any_folder(tmp_path):
     for name in ("one", "a much longer name"):
         folder = tmp_path / name
         folder.mkdir()
-        bags.append(files(recorded(build(folder), folder / f"bag of {name}", play, seconds=2.0)))
+        bags.append(files(record(build(folder), folder / f"bag of {name}", play, seconds=2.0)))
     assert bags[0] == bags[1]
     assert set(bags[0]) == {"metadata.yaml", "scans_0.mcap"}
 
@@ -160,7 +144,7 @@ def test_rosbags_reads_every_message(busy):
 
 def test_write_log_gives_the_final_memory(tmp_path):
     rack = build(tmp_path)
-    bag = recorded(rack, tmp_path / "bag", play, seconds=11.0)
+    bag = record(rack, tmp_path / "bag", play, seconds=11.0)
     writes = [item.message for item in BagReader(bag).messages(topics={"/line1/backplane"})]
     images = [item.message for item in BagReader(bag).messages(topics={"/line1/backplane/snapshot"})]
     assert [write.sequence for write in writes] == list(range(1, len(writes) + 1))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from cli.drive_racks import loop_task, rack_file
+from rack.helpers import written_in
 from recordings.live_racks import build
 from recordings.ros2_bags import recorded_twice
 
@@ -54,8 +55,7 @@ def test_a_bag_of_ros2_bag_record_tells_the_same_drive(tmp_path: Path) -> None:
 
 
 def test_files_of_a_split_recording_add_up_to_the_whole(tmp_path: Path) -> None:
-    (tmp_path / "rack.yaml").write_text(rack_file(more=MORE))
-    (tmp_path / "LOOP.BLK").write_text(loop_task(OSV_FDBK=None, OSV_THRESH=None, SPEED_FDBK=None))
+    written_in(tmp_path, rack_file(more=MORE), LOOP=loop_task(OSV_FDBK=None, OSV_THRESH=None, SPEED_FDBK=None))
     (tmp_path / "s.yaml").write_text(STIMULI)
     run = ["run", str(tmp_path), "--simulated", "--duration", "3", "--stimuli", str(tmp_path / "s.yaml")]
     assert main([*run, "--record", str(tmp_path / "whole")]) == 0

@@ -6,11 +6,11 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
+from rack.helpers import rack_at
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.types.messages import Scan
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.replay.scans.report import DifferenceKind
 from replay.replays import SPEED, WORK, edited, record, recorded, replayed
@@ -26,9 +26,7 @@ def example_rack(folder: Path | None = None, **tasks: str) -> Rack:
             (folder / file.name).write_bytes(file.read_bytes())
         for name, text in tasks.items():
             (folder / f"{name}.BLK").write_text(text)
-    config = load((folder or EXAMPLE) / "rack.yaml").config
-    assert config is not None
-    return Rack(config)
+    return rack_at((folder or EXAMPLE) / "rack.yaml")
 
 
 def drive(rack: Rack, number: int) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rack.helpers import rack_at
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.replay.engine import replay
 from replay.replays import record, replayed
 
@@ -78,9 +78,7 @@ def rack_of(folder: Path, execution: str = "ideal") -> Rack:
     (folder / "rack.yaml").write_text(YAML.format(execution=execution))
     for name, text in (("FAST.BLK", FAST), ("SENDER.BAS", SENDER), ("READER.BAS", READER)):
         (folder / name).write_text(text)
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_at(folder / "rack.yaml")
 
 
 def steps(rack: Rack, number: int) -> None:

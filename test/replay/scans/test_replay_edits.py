@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 from compile.programs import DECLARATIONS
+from rack.helpers import Observer, rack_from
+from soaking import in_soak
 
 from automax_ros.core.names import element_name
 from automax_ros.core.types import Value
-from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.scans.report import DifferenceKind
 from automax_ros.runtime.memory.views import WriteGroup
@@ -36,7 +36,7 @@ STATEMENTS = (
 )
 
 
-class AfterScans:
+class AfterScans(Observer):
     """All of common memory behind each scan, bit for bit."""
 
     def __init__(self, rack: Rack) -> None:
@@ -52,15 +52,6 @@ class AfterScans:
                 exact = struct.pack("<d", value) if isinstance(value, float) else value
                 seen[element_name(variable, element)] = exact
         self.values[record.scan] = seen
-
-    def written(self, writes: list[WriteGroup]) -> None:
-        """Writes between scans are in the next scan's memory."""
-
-    def tuned(self, task: Task, now_ns: int) -> None:
-        """No variable changes."""
-
-    def operated(self, operation: Operation) -> None:
-        """No variable changes."""
 
 
 def statements(choice: random.Random) -> list[str]:
@@ -95,11 +86,7 @@ def edit(body: list[str], choice: random.Random) -> list[str]:
 def ran(text: str, history: list[dict[str, int]], folder: Path) -> tuple[Path, dict[int, dict[str, object]]]:
     """Run and record a task, with writes from outside between its scans."""
     folder.mkdir()
-    (folder / "rack.yaml").write_text(YAML)
-    (folder / "TASK.BLK").write_text(text)
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_from(folder, YAML, TASK=text)
     after = AfterScans(rack)
     rack.observe(after)
 
@@ -130,14 +117,9 @@ def check_edit(seed: int) -> bool:
     return bool(expected)
 
 
-def test_edits_differ_where_running_both_differs():
-    assert sum(check_edit(seed) for seed in range(25)) > 5
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(1200)
-def test_edits_differ_where_running_both_differs_long():
-    assert sum(check_edit(seed) for seed in range(100, 1500)) > 400
+@pytest.mark.parametrize(("seeds", "least"), [(range(25), 5), in_soak(range(100, 1500), 400, timeout_s=1200)])
+def test_edits_differ_where_running_both_differs(seeds, least):
+    assert sum(map(check_edit, seeds)) > least
 
 
 def test_a_dropped_write_is_not_read_back_from_the_recording(tmp_path):

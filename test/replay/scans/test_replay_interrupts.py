@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from rack.helpers import written_in
 
 from automax_ros.cli.main import main
 
@@ -40,9 +41,7 @@ STIMULI = """\
 
 @pytest.mark.parametrize("execution", ["ideal", "modeled"])
 def test_a_recorded_run_replays_and_repeats(tmp_path: Path, capsys, execution):
-    (tmp_path / "SPEED.BLK").write_text(TASK)
-    (tmp_path / "HOG.BLK").write_text(HOG)
-    (tmp_path / "rack.yaml").write_text(RACK.format(execution=execution))
+    written_in(tmp_path, RACK.format(execution=execution), SPEED=TASK, HOG=HOG)
     (tmp_path / "stimuli.yaml").write_text(STIMULI)
     bags = [tmp_path / "one", tmp_path / "two"]
     for bag in bags:

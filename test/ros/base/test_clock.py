@@ -5,6 +5,7 @@ from collections import deque
 from itertools import pairwise
 
 import pytest
+from rack.helpers import Observer
 from system.support import TYPES, ns, wait_until
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
@@ -38,7 +39,7 @@ def made(ros_domain_id):
         live.close()
 
 
-class Log:
+class Log(Observer):
     """All scans of a rack, and what was written from outside, with their times."""
 
     def __init__(self, rack) -> None:
@@ -51,11 +52,6 @@ class Log:
 
     def written(self, writes):
         self.entries += [str(write) for write in writes]
-
-    def tuned(self, *_):
-        pass
-
-    operated = tuned
 
 
 def test_simulated_rack_tells_the_clock_after_all_messages_of_the_instant(made):

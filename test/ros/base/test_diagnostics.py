@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 from recordings.live_racks import build
+from runtime.time.walls import Wall
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.messages.stream.stream import RackStream
@@ -34,19 +35,6 @@ SPEED = """\
 130 END
 """
 EPOCH_NS = 1_700_000_000 * NS_PER_S
-
-
-class Wall:
-    """A wall clock that moves when somebody waits."""
-
-    def __init__(self) -> None:
-        self.now_ns = 7 * NS_PER_S
-
-    def __call__(self) -> int:
-        return self.now_ns
-
-    def wait(self, seconds: float) -> None:
-        self.now_ns += round(seconds * NS_PER_S)
 
 
 class World:

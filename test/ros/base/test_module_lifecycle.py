@@ -3,6 +3,7 @@
 import shutil
 
 import pytest
+from rack.helpers import Observer
 from system.support import RACKS, TYPES
 
 from automax_ros.rack.rack import Rack
@@ -14,7 +15,7 @@ from ros.support import until
 NODE = "processor_1"
 
 
-class Told:
+class Told(Observer):
     """Observes operations."""
 
     def __init__(self):
@@ -22,15 +23,6 @@ class Told:
 
     def operated(self, operation):
         self.operations.append((operation.what, operation.task, operation.ok))
-
-    def scanned(self, task, record, writes):
-        pass
-
-    def written(self, writes):
-        pass
-
-    def tuned(self, task, now_ns):
-        pass
 
 
 @pytest.fixture

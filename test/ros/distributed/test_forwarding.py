@@ -8,6 +8,7 @@ from functools import partial
 
 import pytest
 from rack.distributed.parts import PROCESS_SLOTS, config_in
+from waiting import wait_until
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.types.rack_files import files_of
@@ -88,7 +89,7 @@ def test_processes_that_hear_of_the_start_when_it_is_over_join(tmp_path):
     with running(tmp_path, start_delay_ns=0) as racks:
         home, one, two = racks["parts"]
         assert (home.bus.joining, one.bus.joining, two.bus.joining) == (False, True, True)
-        wait(lambda: one.rack.task("ONE").scan_number > 0 and two.rack.task("TWO").scan_number > 0)
+        wait_until(lambda: one.rack.task("ONE").scan_number > 0 and two.rack.task("TWO").scan_number > 0)
 
 
 def test_what_waits_on_the_bus_is_taken_before_it_counts_as_missing(racks):
@@ -128,7 +129,7 @@ def test_a_word_that_cannot_be_true_changes_nothing(racks, forged):
         racks["executor"].spin_once(timeout_sec=0.01)
         return two.rack.operations.stopped is not None
 
-    wait(told)
+    wait_until(told)
 
 
 def test_requests_reach_the_process_that_has_what_they_are_about(ask, racks):
@@ -141,7 +142,7 @@ def test_requests_reach_the_process_that_has_what_they_are_about(ask, racks):
         ("WIND_A", "udc_10"),
     }
     assert ask("ReadStatus", "status").tasks == 3
-    wait(lambda: one.task("ONE").scan_number > 0)
+    wait_until(lambda: one.task("ONE").scan_number > 0)
     assert ask("OperateTask", "stop", task="ONE").ok
     assert one.task("ONE").status.value == "stopped"
     again = ask("OperateTask", "run", task="NONE")
@@ -176,11 +177,11 @@ def test_a_status_names_the_processes_that_do_not_answer(ask, racks):
 def test_a_stop_all_and_a_run_all_concern_every_process(ask, racks):
     home, one, two = (part.rack for part in racks["parts"])
     assert ask("Trigger", "stop_all").success
-    wait(lambda: all(rack.operations.stopped for rack in (home, one, two)))
+    wait_until(lambda: all(rack.operations.stopped for rack in (home, one, two)))
     assert {task.status.value for rack in (one, two) for task in rack.tasks} == {"stopped"}
     assert ask("Trigger", "run_all").success
     assert {task.status.value for rack in (one, two) for task in rack.tasks} == {"running"}
-    wait(lambda: not any(rack.operations.stopped for rack in (home, one, two)))
+    wait_until(lambda: not any(rack.operations.stopped for rack in (home, one, two)))
     refused = ask("Trigger", "pause")
     assert not refused.success
     assert "several processes" in refused.message
@@ -222,10 +223,3 @@ def test_the_table_of_tasks_is_that_of_all_processes(ask, racks):
         assert all(len({item.slot in (2, 10) for item in told.tasks}) <= 1 for told in statistics)
         racks["parts"][2].close()
         client.until(lambda: shown() == whole[:1], "the table without the process that has ended")
-
-
-def wait(condition) -> None:
-    deadline = time.monotonic_ns() + PATIENCE_NS
-    while not condition():
-        assert time.monotonic_ns() < deadline
-        time.sleep(0.02)

@@ -1,9 +1,8 @@
 """Tunables as ROS parameters: names, and ranges that rclpy accepts."""
 
 import pytest
+from rack.helpers import rack_from
 
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.ros.intake.guard import Throttle
 from automax_ros.ros.nodes.tunables import Tunable, tunables_of
 
@@ -25,11 +24,7 @@ def tunables(tmp_path):
 
     def made(declared: str) -> list[Tunable]:
         lines = ["10 COMMON REF%", f"20 LOCAL {declared}", "100 CALL SCAN_LOOP(TICKS=2)", "110 REF% = REF%", "120 END"]
-        (tmp_path / "TASK.BLK").write_text("\n".join(lines) + "\n")
-        (tmp_path / "rack.yaml").write_text(RACK)
-        config = load(tmp_path / "rack.yaml").config
-        assert config is not None
-        return tunables_of(Rack(config).tasks)
+        return tunables_of(rack_from(tmp_path, RACK, TASK="\n".join(lines) + "\n").tasks)
 
     return made
 

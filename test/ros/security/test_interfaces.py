@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from rack.helpers import config_at
 from system.support import RACKS, ROOT, Automax, wait_until
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.processes import processes_of
 
 LINE = ROOT / "config" / "two_racks" / "line" / "rack.yaml"
@@ -22,9 +22,7 @@ ASKED = {
 
 
 def config_of(path):
-    found = load(path).config
-    assert found is not None
-    return found
+    return config_at(path)
 
 
 @pytest.mark.parametrize("path", [LINE, OPERATED], ids=lambda path: path.parent.name)

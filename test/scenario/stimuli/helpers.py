@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from rack.helpers import rack_from
+
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import StimuliFile, read_for_rack
 
@@ -39,12 +40,7 @@ DRAW = "10 LOCAL N%\n20 CALL SCAN_LOOP(TICKS=2)\n30 N% = N% + 1\n40 END\n"
 
 def rack_in(folder: Path, rack: str = RACK) -> Rack:
     """A rack of two tasks, built and not started."""
-    (folder / "SPEED.BLK").write_text(SPEED)
-    (folder / "DRAW.BLK").write_text(DRAW)
-    (folder / "rack.yaml").write_text(rack)
-    result = load(folder / "rack.yaml")
-    assert result.config is not None, result.diagnostics
-    return Rack(result.config)
+    return rack_from(folder, rack, SPEED=SPEED, DRAW=DRAW)
 
 
 def read(rack: Rack, folder: Path, text: str) -> StimuliFile:

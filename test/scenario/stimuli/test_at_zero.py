@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rack.helpers import rack_at
 
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.replay.engine import replay
 from automax_ros.scenario.report import report_of
@@ -47,9 +46,7 @@ class Run:
         (folder / "NEW.BLK").write_text(SPEED.replace("REF% + N%", "1000"))
         (folder / "rack.yaml").write_text(RACK.format(execution=execution))
         (folder / "stimuli.yaml").write_text(stimuli)
-        config = load(folder / "rack.yaml").config
-        assert config is not None
-        self.rack = Rack(config)
+        self.rack = rack_at(folder / "rack.yaml")
         read = read_for_rack(folder / "stimuli.yaml", self.rack)
         assert read.stimuli is not None, read.diagnostics
         self.happening = StimuliPlayer(read.stimuli, self.rack.scheduler)

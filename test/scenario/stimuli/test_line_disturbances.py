@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import pytest
 from rack.drives.test_drive_faults import active, logged, powered, start
+from rack.helpers import rack_at
 from rack.modeled.modeled_drives import TASK, held
 from replay.replays import edited, record, replayed
 
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
@@ -166,9 +166,7 @@ def played(folder: Path, *, execution: str = "ideal") -> tuple[Rack, StimuliPlay
     """Return a rack at rest at 0 with these stimuli."""
     folder.mkdir(exist_ok=True)
     held(folder, "57C435", rpm=600, execution=execution)
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config)
+    rack = rack_at(folder / "rack.yaml")
     (folder / "s.yaml").write_text("- {at: 0, set: {PERMIT@: true}}\n" + STIMULI)
     file = read_for_rack(folder / "s.yaml", rack)
     assert file.stimuli is not None, file.diagnostics

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from rack.helpers import good
+from rack.helpers import Told, good
 
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.operator.switches import MOST_CHARACTERS, SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.scenario.stimuli.player import StimuliPlayer
-from automax_ros.scenario.stimuli.reader import read_for_rack
+from scenario.stimuli.helpers import playing
 
 RACK = """\
 rack: LINE1
@@ -23,41 +22,15 @@ plants:
 """
 
 
-class Told:
-    """The operations that observers are told of."""
-
-    def __init__(self) -> None:
-        self.operations = []
-
-    def operated(self, operation) -> None:
-        self.operations.append(operation)
-
-    def scanned(self, *_) -> None: ...
-
-    def written(self, _) -> None: ...
-
-    def tuned(self, *_) -> None: ...
-
-
 def rack_of(folder: Path) -> tuple[Rack, Told]:
     rack, told = Rack(good(folder, RACK)), Told()
     rack.observe(told)
     return rack, told
 
 
-def played(rack: Rack, folder: Path, text: str) -> StimuliPlayer:
-    (folder / "stimuli.yaml").write_text(text)
-    file = read_for_rack(folder / "stimuli.yaml", rack)
-    assert file.stimuli is not None, file.diagnostics
-    found = StimuliPlayer(file.stimuli, rack.scheduler)
-    rack.start()
-    found.begin()
-    return found
-
-
 def test_stimuli_break_load_and_mend_plants_at_their_instants(tmp_path):
     rack, told = rack_of(tmp_path)
-    found = played(
+    found = playing(
         rack,
         tmp_path,
         """\

@@ -10,10 +10,10 @@ from typing import Any
 
 import jsonschema
 import pytest
+from rack.helpers import rack_at
 from yaml_core import data_of
 
 import automax_ros.core
-from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import KEYS, load, schema
 from automax_ros.rackfile.modules.registry import KINDS, SUPPORTED, module_number
 from automax_ros.scenario.stimuli.rack_verbs import rack_verbs
@@ -179,9 +179,7 @@ def test_every_spelling_of_a_module_is_valid(model, form):
 
 
 def test_stimuli_know_the_verbs_of_a_rack():
-    config = load(FAULTY / "rack.yaml").config
-    assert config is not None
-    assert set(VERB_SCHEMAS) == set(rack_verbs(Rack(config), FAULTY / "a.yaml", allow_outside=False))
+    assert set(VERB_SCHEMAS) == set(rack_verbs(rack_at(FAULTY / "rack.yaml"), FAULTY / "a.yaml", allow_outside=False))
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rack.helpers import Observer, config_at, rack_at
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rackfile.loader import load
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
@@ -38,7 +38,7 @@ VERBS = """\
 """
 
 
-class Common:
+class Common(Observer):
     """Notes each write with whether it is made in every process."""
 
     def __init__(self, rack: Rack, stimulation: StimuliPlayer) -> None:
@@ -53,21 +53,13 @@ class Common:
     def scanned(self, task, record, writes):  # noqa: ARG002
         self.written(writes)
 
-    def tuned(self, task, now_ns):
-        """Not asked for."""
-
-    def operated(self, operation):
-        """Not asked for."""
-
 
 def part(folder: Path, verbs: str, *slots: int) -> tuple[Rack, StimuliPlayer]:
     (folder / "rack.yaml").write_text(RACK)
     for name in ("ONE", "TWO"):
         (folder / f"{name}.BLK").write_text(TASK)
     (folder / "do.yaml").write_text(verbs)
-    config = load(folder / "rack.yaml").config
-    assert config is not None
-    rack = Rack(config, local=slots or None)
+    rack = rack_at(folder / "rack.yaml", local=slots or None)
     file = read_for_rack(folder / "do.yaml", rack)
     assert file.stimuli is not None, file.diagnostics
     return rack, StimuliPlayer(file.stimuli, rack.scheduler)
@@ -138,8 +130,7 @@ def test_who_joins_leaves_out_what_has_happened(tmp_path):
 def test_a_file_may_be_json(tmp_path):
     """Keys of JSON stand in quotes, slots too."""
     (tmp_path / "rack.yaml").write_text("rack: PM1\nslots:\n  0: {module: 57C435}\n  7: {module: 57C406}\n")
-    config = load(tmp_path / "rack.yaml").config
-    assert config is not None
+    config = config_at(tmp_path / "rack.yaml")
     path = tmp_path / "stimuli.json"
     path.write_text('[{"at": 1.5, "module": {"7": {"test_switch": "A", "fault_reset_switch": true}}}]\n')
     read = read_for_rack(path, Rack(config))

@@ -9,13 +9,14 @@ import threading
 import time
 
 import pytest
+from waiting import PATIENCE_S, has_ended, wait_until
 
 from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.native.run import compiler_process
 from automax_ros.compile.native.run.build import build, find_compiler
 from automax_ros.compile.native.run.cache import STALE_S
 from automax_ros.compile.native.run.compiler_process import FOLDER, abandon, memory_of, run_compiler
-from compile.native.support import PATIENCE_S, await_that, begun_compiler_of, compiler_of, has_ended
+from compile.native.support import begun_compiler_of, compiler_of
 
 NEEDS_GCC = pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
 
@@ -186,7 +187,7 @@ def test_what_a_compiler_leaves_running_ends_with_it(tmp_path):
     path = compiler_of(tmp_path, f"{going_on} while [ ! -s {child} ]; do :; done; echo done; exit 3")
     with pytest.raises(NotNative, match="exit code 3"):
         run_compiler([str(path)], os.environ["PATH"])
-    await_that(lambda: has_ended(int(child.read_text())))
+    wait_until(lambda: has_ended(int(child.read_text())))
 
 
 RUNNING = """
@@ -206,12 +207,12 @@ def test_however_we_end_the_compiler_ends_with_what_it_has_started(tmp_path, tem
         [sys.executable, "-c", RUNNING], env={**os.environ, "CC": str(path)}, stderr=subprocess.DEVNULL
     )
     begun = int((tmp_path / "begun").read_text())  # blocks until the compiler has begun
-    await_that(lambda: child.exists() and child.read_text().endswith("\n"))
+    wait_until(lambda: child.exists() and child.read_text().endswith("\n"))
     assert len(list(temporary.iterdir())) == 1
     ours.send_signal(number)
     ours.wait(PATIENCE_S)
-    await_that(lambda: has_ended(begun) and has_ended(int(child.read_text())))
-    await_that(lambda: list(temporary.iterdir()) == [])
+    wait_until(lambda: has_ended(begun) and has_ended(int(child.read_text())))
+    wait_until(lambda: list(temporary.iterdir()) == [])
 
 
 def test_what_is_abandoned_takes_no_other_thread_s_compiler_along(tmp_path):
@@ -228,11 +229,11 @@ def test_what_is_abandoned_takes_no_other_thread_s_compiler_along(tmp_path):
     for name, ending in (("first", "exec sleep 1000"), ("second", f"cat {goes_on}")):
         threads.append(threading.Thread(target=run, args=(tmp_path / name, ending)))
         threads[-1].start()
-        await_that((tmp_path / name / "begun").exists)
+        wait_until((tmp_path / name / "begun").exists)
         numbers.append(int((tmp_path / name / "begun").read_text()))
     abandon(threads[:1])
     threads[0].join()
-    await_that(lambda: has_ended(numbers[0]))
+    wait_until(lambda: has_ended(numbers[0]))
     goes_on.write_text("it went on")
     threads[1].join()
     assert said == ["it went on"]

@@ -4,6 +4,7 @@ import signal
 import threading
 
 import pytest
+from waiting import has_ended, wait_until
 
 from automax_ros.compile.base.native_source import NOT_KEPT
 from automax_ros.compile.native.run import task as task_module
@@ -20,7 +21,7 @@ from automax_ros.compile.native.run.forms import (
 )
 from automax_ros.compile.native.run.task import native_form
 from compile.base.test_host import TASK
-from compile.native.support import await_that, begun_compiler_of, compiler_of, has_ended
+from compile.native.support import begun_compiler_of, compiler_of
 from compile.support import compiled_of
 
 
@@ -122,7 +123,7 @@ def test_ctrl_c_ends_the_compilers_too(compiled, monkeypatch, tmp_path):
         assert thread is threading.main_thread() or thread.daemon  # no thread keeps the program from its end
         if thread.name.endswith("(work)"):
             thread.join()
-    await_that(lambda: has_ended(started[0]))
+    wait_until(lambda: has_ended(started[0]))
 
 
 def test_ctrl_c_amid_a_translation_waits_for_nothing_and_starts_no_compiler(compiled, monkeypatch, tmp_path):
@@ -144,7 +145,7 @@ def test_ctrl_c_amid_a_translation_waits_for_nothing_and_starts_no_compiler(comp
     goes_on.set()
     assert over.wait(60)
     if ran.exists():  # it was started, and ended at once
-        await_that(lambda: has_ended(int(ran.read_text())))
+        wait_until(lambda: has_ended(int(ran.read_text())))
 
 
 def test_an_end_asked_for_on_a_thread_is_raised(compiled, monkeypatch, tmp_path):

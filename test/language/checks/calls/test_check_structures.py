@@ -39,21 +39,18 @@ def only(*lines: str, declare: str = DECLARE) -> tuple[str, int, str]:
     return found.code, found.statement, text_at(text, found)
 
 
-def test_a_task_with_all_blocks() -> None:
-    assert codes(task(*ALL, declare=DECLARE)) == []
-
-
-def test_a_structure_may_be_used_before_it_is_made() -> None:
-    assert codes(task(*reversed(ALL), declare=DECLARE)) == []
-
-
-def test_structures_of_two_types_may_have_one_name() -> None:
-    assert codes(task(WORDS, BITS.replace("FLAGS@", "QUEUE@"), READ_WORDS, declare=DECLARE)) == []
-
-
-@pytest.mark.parametrize("declared", ["QUEUE%", "QUEUE%, FLAGS@"])
-def test_a_structure_may_be_declared_local(declared: str) -> None:
-    assert codes(task(*ALL, declare=f"{DECLARE}, {declared}")) == []
+@pytest.mark.parametrize(
+    ("statements", "declare"),
+    [
+        pytest.param(ALL, DECLARE, id="all blocks"),
+        pytest.param(ALL[::-1], DECLARE, id="used before they are made"),
+        pytest.param((WORDS, BITS.replace("FLAGS@", "QUEUE@"), READ_WORDS), DECLARE, id="two types of one name"),
+        pytest.param(ALL, f"{DECLARE}, QUEUE%", id="one declared LOCAL"),
+        pytest.param(ALL, f"{DECLARE}, QUEUE%, FLAGS@", id="both declared LOCAL"),
+    ],
+)
+def test_right_structures(statements: tuple[str, ...], declare: str) -> None:
+    assert codes(task(*statements, declare=declare)) == []
 
 
 @pytest.mark.parametrize("block", [READ_WORDS, READ_BITS, WRITE_WORDS, WRITE_BITS])

@@ -32,8 +32,12 @@ def test_default_length_is_31() -> None:
     assert program(declared("LOCAL S$")).symbols["S$"].length == 31
 
 
-def test_names_that_differ_in_type_are_different_variables() -> None:
-    assert codes(declared("LOCAL A!, A@, A, A$")) == []
+@pytest.mark.parametrize(
+    "text",
+    ["LOCAL A!, A@, A, A$", "LOCAL T%(65534)", "LOCAL T%(999,999)", "LOCAL T%(1,1,1,1)", "LOCAL S$:255(10)"],
+)
+def test_names_that_differ_in_type_and_the_largest_sizes(text: str) -> None:
+    assert codes(declared(text)) == []
 
 
 @pytest.mark.parametrize("second", ["LOCAL A%", "COMMON A%", "LOCAL A%(3)"])
@@ -67,11 +71,6 @@ def test_second_declaration_shows_both_places(second: str) -> None:
 )
 def test_each_is_one_error(text: str, code: str) -> None:
     assert codes(declared(text)) == [code]
-
-
-@pytest.mark.parametrize("text", ["LOCAL T%(65534)", "LOCAL T%(999,999)", "LOCAL T%(1,1,1,1)", "LOCAL S$:255(10)"])
-def test_largest_sizes(text: str) -> None:
-    assert codes(declared(text)) == []
 
 
 def test_data_of_a_task_is_bounded() -> None:
