@@ -44,7 +44,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         files.setdefault(item.path, []).append(item)
     longest_first = sorted(files, key=lambda path: (-len(files[path]), path))
-    racks = [path for path in longest_first if path.parent.name == "system" or path.name == "test_live_examples.py"]
+    racks = [
+        path
+        for path in longest_first
+        if path.is_relative_to(Path(__file__).parent / "system") or path.name == "test_live_examples.py"
+    ]
     others = [path for path in longest_first if path not in racks]
     order = itertools.chain.from_iterable(itertools.zip_longest(racks, others))
     items[:] = [item for path in order if path is not None for item in files[path]]

@@ -1,4 +1,4 @@
-"""The lock that lets one rack of a name run in a ROS domain; test/system/test_stopping.py has it between processes."""
+"""The lock that lets one rack of a name run in a ROS domain; system/running/test_stopping.py: between processes."""
 
 import os
 

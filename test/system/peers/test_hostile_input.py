@@ -13,7 +13,7 @@ import pytest
 from system.support import PATIENCE_S, TYPES, Automax, Client
 
 READY = "Ctrl-C ends the run"
-HOSTILE = Path(__file__).with_name("hostile.py")
+HOSTILE = Path(__file__).parents[1] / "hostile.py"
 IDLE_S = 2.0
 ATTEMPTS = 3
 """Other programs of the host may hold scans up, but hardly each time as an attack goes on."""

@@ -9,7 +9,7 @@ import pytest
 
 from automax_ros.core import compiled
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def automax(switch, *arguments):

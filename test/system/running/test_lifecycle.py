@@ -79,7 +79,7 @@ def test_a_manager_brings_a_rack_up_and_down_again(ros_domain_id, rack, tmp_path
 def test_the_page_shows_how_it_is_done_by_hand(ros_domain_id, tmp_path):
     """The commands of docs/ros.md, one after the other."""
     page = (ROOT / "docs" / "ros.md").read_text(encoding="utf-8")
-    found = re.search(r"<!-- run by test/system/test_lifecycle.py -->\n```sh\n(.*?)```", page, re.DOTALL)
+    found = re.search(r"<!-- run by test/system/running/test_lifecycle.py -->\n```sh\n(.*?)```", page, re.DOTALL)
     assert found is not None
     file = tmp_path / "rack.yaml"
     file.write_text(OPERATED.read_text().replace("rack: OPERATED", "rack: PM1").replace(", critical: true", ""))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from system.support import PATIENCE_S
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.S)
 SIMULATED, OPERATED, REAL_TIME, IN_ROS, TWO_RACKS = EXAMPLES
 

@@ -15,9 +15,9 @@ from automax_ros.cli.main import main
 from automax_ros.messages.types.messages import Scan
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.soundness import verdict_of
+from system.examples.test_python_page import IN_ROS
+from system.running.test_stopping import READY, shared_memory
 from system.support import COMMAND, PATIENCE_S, RACKS, ROOT, Automax, catches
-from system.test_python_page import IN_ROS
-from system.test_stopping import READY, shared_memory
 
 OPERATED = RACKS / "operated" / "rack.yaml"
 HORIZON_S = 2.5
