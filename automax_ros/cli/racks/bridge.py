@@ -88,19 +88,15 @@ def run(arguments: argparse.Namespace) -> int:
     )
     try:
         if arguments.motor_k is None:
-            _refuse_motor_options(arguments)
+            for name in ("inertia", "friction", "load", "duration", "csv"):
+                if getattr(arguments, name) is not None:
+                    raise UsageError(f"--{name} is for a motor's run", "give --motor-k as well")
             _steady(case, arguments)
         else:
             _run_motor(case, arguments)
     except DriveError as error:
         raise UsageError(str(error)) from error
     return 0
-
-
-def _refuse_motor_options(arguments: argparse.Namespace) -> None:
-    for name in ("inertia", "friction", "load", "duration", "csv"):
-        if getattr(arguments, name) is not None:
-            raise UsageError(f"--{name} is for a motor's run", "give --motor-k as well")
 
 
 def _steady(case: BridgeCase, arguments: argparse.Namespace) -> None:

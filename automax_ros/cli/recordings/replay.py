@@ -81,7 +81,9 @@ def run(arguments: argparse.Namespace) -> int:
         require_picture_file(arguments.plot)
     where = where_of(arguments)
     new = {name: _source(name, path) for name, path in files.items()}
-    _require_replayed(options, new)
+    for name in new:
+        if options.only is not None and name not in options.only:
+            raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
     try:
         report = _replayed(Replay(arguments.bag, new, options), where, arguments)
     except SourceRefused as error:
@@ -166,13 +168,6 @@ def _source(name: str, path: Path) -> SourceText:
         return read_task_source(path)
     except FileFault as fault:
         raise UsageError(f"--task {name}: {path} {fault}") from fault
-
-
-def _require_replayed(options: ReplayOptions, new: dict[str, SourceText]) -> None:
-    """Refuse a new source for a task that --only excludes."""
-    for name in new:
-        if options.only is not None and name not in options.only:
-            raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
 
 
 def _with_repair(error: BagError, bag: Path) -> BagError:

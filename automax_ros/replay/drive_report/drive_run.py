@@ -124,7 +124,9 @@ class DriveRun:
         if keyword in FAULTS:
             self._note_fault(time_s, signal, on=on)
         elif keyword == SUSPECT and value != before and on:
-            self.tell(time_s, "fault", f"suspected shorted SCR: {_suspects(int(value))} ({signal.variable})")
+            number = int(value)
+            suspects = f"{number} or {PARTNER[number]}" if number in FORWARD else f"{number}"
+            self.tell(time_s, "fault", f"suspected shorted SCR: {suspects} ({signal.variable})")
             return
         if before is None or (before != 0.0) == on:
             return
@@ -261,10 +263,6 @@ class DriveRun:
             for number, key in enumerate(keys)
             for label, unit, kind, role in [key]
         ]
-
-
-def _suspects(number: int) -> str:
-    return f"{number} or {PARTNER[number]}" if number in FORWARD else f"{number}"
 
 
 def _cause_first(item: tuple[str, float]) -> int:
