@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 DEFAULT_FOR_S = "0.2"
 _LOOK_S = 0.01
-Answer = Callable[[ServiceCall, int], Any]
+Answer = Callable[["ServiceCall", int], Any]
 """Sends a request, waits for at most a given time (ns), and returns the answer."""
 
 
