@@ -14,6 +14,7 @@ from pathlib import Path
 
 from automax_ros.cli.options.values import add_window_arguments, option_number, whole_number, window_of
 from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, where_of
+from automax_ros.cli.output.difference_figure import can_be_drawn, draw, traces
 from automax_ros.cli.output.files import require_different_files, require_picture_file
 from automax_ros.cli.output.screen import print_diagnostics, print_warning_count, share_shown
 from automax_ros.cli.output.signals import ended_by_signals
@@ -23,7 +24,6 @@ from automax_ros.parallel.job import ClusterFault, Workers
 from automax_ros.rackfile.reading.files import FileFault, read_task_source
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
-from automax_ros.replay.picture import can_be_drawn, draw, traces
 from automax_ros.replay.scans.report import ReplayReport
 from automax_ros.replay.scans.stored_rack import SourceRefused
 from automax_ros.replay.side_by_side import replay_side_by_side
