@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.cli.options.values import number
-from automax_ros.cli.output.figure import new_figure, save
 from automax_ros.cli.output.files import opened_for_writing
 from automax_ros.core.user_error import UsageError
 from automax_ros.drive.base.errors import LARGEST, DriveError, require
@@ -193,6 +192,8 @@ def plot(case: BridgeCase, state: SteadyState, path: Path) -> None:
     Raises:
         UsageError: matplotlib is missing, or the file cannot be written.
     """
+    from automax_ros.cli.output.figure import new_figure, save
+
     figure = new_figure(10, 9, dpi=100, what="--plot")
     moments = list(waveforms(case, state))
     axes: Any = figure.subplots(4, 1, sharex=True, height_ratios=(3, 2, 1.4, 1.4))
