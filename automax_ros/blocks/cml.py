@@ -179,7 +179,7 @@ def _boolean(name: str, text: str, *, default: bool | None = False, form: Form =
     return Input.boolean(name, name, text, default=default, form=form)
 
 
-def _shown(name: str, text: str, alias: str = "") -> Output:
+def _boolean_output(name: str, text: str, alias: str = "") -> Output:
     return Output(name, DataType.BOOLEAN, name, text, required=False, holds=True, alias=alias)
 
 
@@ -239,27 +239,27 @@ INPUTS = (
     _boolean("FAULT_RESET", "TRUE resets drive faults; read in standby", default=None, form=Form.VARIABLE),
 )
 OUTPUTS = (
-    _shown("DC_CML_STATE", "TRUE: run, FALSE: standby"),
-    _shown("SYNC_LOCKED", "TRUE while the loop keeps step with the line"),
+    _boolean_output("DC_CML_STATE", "TRUE: run, FALSE: standby"),
+    _boolean_output("SYNC_LOCKED", "TRUE while the loop keeps step with the line"),
     _number("LINE_PERIOD", "period of the line in us, 16129 to 20833"),
-    _shown("INSWITCH_POSA", "TRUE while the test switch of the 57C406 is in position A"),
-    _shown("INSWITCH_POSB", "TRUE while it is in position B"),
-    _shown("INFAULT_RESET", "TRUE while the fault reset switch of the 57C406 is closed", "INFALT_RESET"),
+    _boolean_output("INSWITCH_POSA", "TRUE while the test switch of the 57C406 is in position A"),
+    _boolean_output("INSWITCH_POSB", "TRUE while it is in position B"),
+    _boolean_output("INFAULT_RESET", "TRUE while the fault reset switch of the 57C406 is closed", "INFALT_RESET"),
     _number("DC_TIME", "time without current since the last scan in us, 0 to 3472"),
-    _shown("BRIDGE_POL", "TRUE: bridge 2 is on, FALSE: bridge 1"),
+    _boolean_output("BRIDGE_POL", "TRUE: bridge 2 is on, FALSE: bridge 1"),
     _number("REF_RATE_OUT", "reference after the rate limit"),
     _number("REF_LAG_OUT", "reference after the lag"),
     _number("FDBK_GAIN", "gain of the feedback x 1024, 512 to 1280"),
     _number("I_FDBK", "current feedback, 4095 counts = LIM_BAR"),
     _number("INTEGRAL_GAIN", "integral gain x 1024"),
     _number("DELTA", "180 degrees less the firing angle, in us, 0 to 10417"),
-    _shown("IOC_OUT", "fault: instantaneous overcurrent"),
-    _shown("SYNC_LOSS_OUT", "fault: the loop has lost the line"),
-    _shown("TACH_LOSS_OUT", "fault: voltage without speed"),
-    _shown("OSV_OUT", "fault: overspeed or overvoltage"),
-    _shown("EXT_IET_OUT", "fault: external instantaneous electronic trip"),
-    _shown("PHROT_FLT_OUT", "fault: wrong phase rotation"),
-    _shown("BAD_SCR_OUT", "fault: shorted SCR; programming it enables the test before each start"),
+    _boolean_output("IOC_OUT", "fault: instantaneous overcurrent"),
+    _boolean_output("SYNC_LOSS_OUT", "fault: the loop has lost the line"),
+    _boolean_output("TACH_LOSS_OUT", "fault: voltage without speed"),
+    _boolean_output("OSV_OUT", "fault: overspeed or overvoltage"),
+    _boolean_output("EXT_IET_OUT", "fault: external instantaneous electronic trip"),
+    _boolean_output("PHROT_FLT_OUT", "fault: wrong phase rotation"),
+    _boolean_output("BAD_SCR_OUT", "fault: shorted SCR; programming it enables the test before each start"),
     _number("BAD_SCR_NUM", "pair of the shorted SCR, 1 to 6"),
     Output(
         "DIAG_DATA",

@@ -93,12 +93,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         output = VisibleOutput()
     except KeyboardInterrupt:
-        return _interrupted(words)
+        return _interrupt_code(words)
     try:
         code = _run(words)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        return _interrupted(words)
+        return _interrupt_code(words)
     except BrokenPipeError:
         _discard_output()
         return BROKEN_PIPE
@@ -121,7 +121,7 @@ def _run(argv: list[str]) -> int:
         words, ros = _split(argv)
         name = _name(words)
         if name is not None and name not in SUBCOMMANDS:
-            raise _unknown(name)
+            raise _unknown_command(name)
         module = module_of(name) if name is not None else None
         parser, subparsers = parsers({} if module is None else {str(name): module})
         own = subparsers.get(str(name), parser)
@@ -147,7 +147,7 @@ def _name(words: Sequence[str]) -> str | None:
     return next((word for word in words if not word.startswith("-")), None)
 
 
-def _interrupted(words: Sequence[str]) -> int:
+def _interrupt_code(words: Sequence[str]) -> int:
     """Return the exit code after a Ctrl-C before the command handles signals itself: the same as in ``early``."""
     return 0 if _until_stopped(words) else INTERRUPTED
 
@@ -244,7 +244,7 @@ def module_of(name: str) -> ModuleType:
     return importlib.import_module(f"automax_ros.cli.{folder}.{word}")
 
 
-def _unknown(name: str) -> Exception:
+def _unknown_command(name: str) -> Exception:
     from automax_ros.core.text import did_you_mean, quoted
     from automax_ros.core.user_error import UsageError
 

@@ -29,7 +29,7 @@ def until_work_begins(*, ends_well: bool) -> None:
     """Make SIGINT, SIGTERM and SIGHUP end the program at once; one that is ignored stays ignored.
 
     ``ends_well``: with exit code 0, since to be stopped is its end (decision: launch files and supervisors take another
-    code for a failure, and the person cannot know how far the program has come).
+    code for a failure, and the user cannot know how far the program has come).
     """
     for number in _NUMBERS:
         if _signal.getsignal(number) != _signal.SIG_IGN:

@@ -47,7 +47,7 @@ class VisibleOutput:
     def __init__(self) -> None:
         """Replace the streams; those that are visible already stay as they are."""
         self._before = sys.stdout, sys.stderr
-        sys.stdout, sys.stderr = _seen(sys.stdout), _seen(sys.stderr)
+        sys.stdout, sys.stderr = _make_visible(sys.stdout), _make_visible(sys.stderr)
 
     def undo(self) -> None:
         """Restore the previous streams."""
@@ -62,5 +62,5 @@ def write_control(stream: TextIO, text: str) -> None:
         stream.write(text)
 
 
-def _seen(stream: TextIO) -> TextIO:
+def _make_visible(stream: TextIO) -> TextIO:
     return stream if isinstance(stream, VisibleStream) else cast(TextIO, VisibleStream(stream))

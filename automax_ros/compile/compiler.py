@@ -157,11 +157,11 @@ class CompiledTask:
 
 def compile_program(program: Program, views: Mapping[str, int], cost_model: CostModel | None = None) -> CompiledTask:
     """Compile a checked program against a rack's views (full name -> view) of all commons it declares."""
-    return _compiled(program, views, cost_model or CostModel(), frozenset())
+    return _compile(program, views, cost_model or CostModel(), frozenset())
 
 
-def _compiled(program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> CompiledTask:
-    again = partial(_compiled, program, views, cost_model)
+def _compile(program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> CompiledTask:
+    again = partial(_compile, program, views, cost_model)
     kind = _BasicCompilation if program.is_basic else _ScanCompilation
     return kind(program, views, cost_model, held).result(again)
 
@@ -203,23 +203,23 @@ class _Compilation(ABC):
 
     def definitions(self, *names: str) -> list[ast.FunctionDef]:
         """Return functions as trees; the state's fields are known once ``scans`` or ``burst`` is lowered."""
-        parts = [self._lowered(name) for name in names]
-        return [self._wrapped(*part) for part in parts]
+        parts = [self._lower(name) for name in names]
+        return [self._wrap(*part) for part in parts]
 
     def form(self, name: str) -> Form:
         return Form(self.definitions(name)[0], dict(self._globals), self._views)
 
     def line_form(self) -> LineForm:
         """Compile the form that yields before each line; it applies forces."""
-        part = self._lowered(self.line_name)
-        functions = made([self._wrapped(*part)], self._program.name, self._globals)
+        part = self._lower(self.line_name)
+        functions = made([self._wrap(*part)], self._program.name, self._globals)
         return LineForm(cast(ScanLines, functions[self.line_name]), frozenset(part[1].lines))
 
     @abstractmethod
-    def _lowered(self, name: str) -> _Part: ...
+    def _lower(self, name: str) -> _Part: ...
 
     @abstractmethod
-    def _wrapped(self, name: str, emitter: Emitter, lowering: StatementLowering) -> ast.FunctionDef: ...
+    def _wrap(self, name: str, emitter: Emitter, lowering: StatementLowering) -> ast.FunctionDef: ...
 
     def _emitter(self, name: str) -> Emitter:
         modeled, by_lines = "_steps" in name, "_lines" in name
@@ -240,7 +240,7 @@ class _BasicCompilation(_Compilation):
         layout = Layout(tuple(self._fields.values()))
         return CompiledTask(self._program, layout, (), (), _no_startup, _no_scans, self, again, self._held)
 
-    def _lowered(self, name: str) -> _Part:
+    def _lower(self, name: str) -> _Part:
         emitter = self._emitter(name)
         lowering = WaitingLowering(emitter, {})
         lowering.lower_all(self._program.scan)
@@ -249,7 +249,7 @@ class _BasicCompilation(_Compilation):
         self._end(emitter)
         return name, emitter, lowering
 
-    def _wrapped(self, name: str, emitter: Emitter, _: StatementLowering) -> ast.FunctionDef:
+    def _wrap(self, name: str, emitter: Emitter, _: StatementLowering) -> ast.FunctionDef:
         self._bind(emitter)
         opening = [build.assign_all(list(self._fields), build.name("state")), build.assign("steps", build.constant(0))]
         if emitter.modeled:
@@ -286,7 +286,7 @@ class _ScanCompilation(_Compilation):
             program=self._program,
             layout=Layout(tuple(self._fields.values())),
             latched=self._latched,
-            written=self._written(),
+            written=self._written_names(),
             startup=functions["startup"],
             scans=functions["scans"],
             _compilation=self,
@@ -295,9 +295,9 @@ class _ScanCompilation(_Compilation):
             latched_views=tuple(self._views[name] for name in self._latched),
         )
 
-    def _lowered(self, name: str) -> _Part:
+    def _lower(self, name: str) -> _Part:
         emitter = self._emitter(name)
-        emitter.forces = frozenset(self._written()) if name.endswith("_forced") else frozenset()
+        emitter.forces = frozenset(self._written_names()) if name.endswith("_forced") else frozenset()
         lowering = StatementLowering(emitter, dict(self._instances.items()))
         if name == "startup":
             lowering.lower_all(self._program.startup)
@@ -323,7 +323,7 @@ class _ScanCompilation(_Compilation):
         if not self._latched:
             emitter.emit(build.do(latch))
             return
-        written = self._written()
+        written = self._written_names()
         kept = [name for name in self._latched if name in written]
         names = [latched_name(name) if name in written else variable_name(name) for name in self._latched]
         emitter.emit(build.assign_all(names, latch))
@@ -333,7 +333,7 @@ class _ScanCompilation(_Compilation):
             flags = [forced_name(name) for name in kept]
             emitter.emit(build.assign_all(flags, build.call(emitter.member("forces"))))
 
-    def _written(self) -> tuple[str, ...]:
+    def _written_names(self) -> tuple[str, ...]:
         bounds = [instance.bound for instance in self._instances.values()]
         if self._program.cml is not None:
             bounds.append(self._program.cml)
@@ -344,7 +344,7 @@ class _ScanCompilation(_Compilation):
         """Return END: values that differ from the latch are written back."""
         outer, emitter.body = emitter.body, []
         emitter.add_cost(self._cost.end_ns(self._program))
-        written = self._written()
+        written = self._written_names()
         emitter.checkpoint()
         if written:
             emitter.emit(build.assign("changes", ast.List([], build.LOAD)))
@@ -360,7 +360,7 @@ class _ScanCompilation(_Compilation):
         body, emitter.body = emitter.body, outer
         return body
 
-    def _wrapped(self, name: str, emitter: Emitter, lowering: StatementLowering) -> ast.FunctionDef:
+    def _wrap(self, name: str, emitter: Emitter, lowering: StatementLowering) -> ast.FunctionDef:
         """Return the whole function: load the state, bind the names in use, execute the body, store the state."""
         self._bind(emitter)
         body = emitter.body

@@ -102,7 +102,7 @@ def _circles(edges: Edges, entry: int) -> list[list[int]]:
             if work:
                 low[work[-1][0]] = min(low[work[-1][0]], low[node])
             if low[node] == numbers[node]:
-                found.append(_popped(stack, open_nodes, node))
+                found.append(_pop_circle(stack, open_nodes, node))
         elif to not in numbers:
             numbers[to] = low[to] = len(numbers)
             stack.append(to)
@@ -117,7 +117,7 @@ def _nodes_after(edges: Edges, node: int) -> list[int]:
     return [to for to in edges[node] if isinstance(to, int)]
 
 
-def _popped(stack: list[int], open_nodes: set[int], last: int) -> list[int]:
+def _pop_circle(stack: list[int], open_nodes: set[int], last: int) -> list[int]:
     circle: list[int] = []
     while not circle or circle[-1] != last:
         circle.append(stack.pop())

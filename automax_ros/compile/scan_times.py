@@ -186,7 +186,7 @@ class _Suite:
             least, most = self.model.block_bounds_ns(self.program.calls[statement.span])
             return {_Way.NEXT: Span(least, most)}
         if isinstance(statement, If):
-            inner = _joined(self._branch(statement), self.ways(statement.otherwise))
+            inner = _join(self._branch(statement), self.ways(statement.otherwise))
         elif isinstance(statement, For):
             inner = self._loop(statement)
         else:
@@ -205,13 +205,13 @@ class _Suite:
             return self._to_line(statement.line, gosub=True)
         if isinstance(statement, OnJump):
             past: _Ways = {_Way.NEXT: NOTHING}
-            return _joined(past, *(self._to_line(line, statement.gosub) for line in statement.lines))
+            return _join(past, *(self._to_line(line, statement.gosub) for line in statement.lines))
         if isinstance(statement, Return) and self.inside:
             return {_Way.RETURN: NOTHING}
         if isinstance(statement, (End, Stop)):
             return {_Way.END if isinstance(statement, End) else _Way.STOP: NOTHING}
         past = {_Way.NEXT: NOTHING}
-        return _joined(past, *(self._to_line(line, gosub=False) for line in jumps_of(statement)))
+        return _join(past, *(self._to_line(line, gosub=False) for line in jumps_of(statement)))
 
     def _to_line(self, line: int, gosub: bool) -> _Ways:
         """Return the exits of a jump or a GOSUB; one that nests too deep is skipped."""
@@ -258,7 +258,7 @@ def _count(first: int, last: int, step: int, bounds: tuple[int, int]) -> int:
     return max(0, (last - first) // step + 1)
 
 
-def _joined(*several: _Ways) -> _Ways:
+def _join(*several: _Ways) -> _Ways:
     result: _Ways = {}
     for ways in several:
         for way, span in ways.items():

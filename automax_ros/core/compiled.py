@@ -3,7 +3,7 @@
 The Python files are the reference and always exist. Machine code made from them (by mypyc, `make setup`) is in a folder
 ``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter; no other
 place is searched. A group of modules is used only if every source that it was made from, and every source that its
-types came from, still has the same content (decision): whoever edits a file runs what was edited. If libraries are
+types came from, still has the same content (decision): a file that was edited runs as it is. If libraries are
 missing, cannot be loaded on this machine, or call another module's C in a version that is not there, the Python files
 run too; ``automax --version`` says why. ``AUTOMAX_COMPILED=off`` in the environment switches all of it off.
 """
@@ -44,8 +44,8 @@ class CompiledGroup:
     def fresh(self, package: str) -> bool:
         """Return whether the sources below the folder ``package`` are those that were compiled; checked once."""
         if self.stale is None:
-            harmed = (_harmed(file, size) for file, size in self.sizes.items())
-            changed = (_changed(package, file, digest) for file, digest in self.sources.items())
+            harmed = (_explain_damage(file, size) for file, size in self.sizes.items())
+            changed = (_explain_change(package, file, digest) for file, digest in self.sources.items())
             others = (_differing(module, *version) for module, version in self.interfaces.items())
             self.stale = next((why for reasons in (harmed, changed, others) for why in reasons if why), "")
         return not self.stale
@@ -188,7 +188,7 @@ def _folders(package: str) -> tuple[str, ...]:
     )
 
 
-def _harmed(file: str, size: int) -> str:
+def _explain_damage(file: str, size: int) -> str:
     try:
         found = os.path.getsize(file)
     except OSError:
@@ -196,7 +196,7 @@ def _harmed(file: str, size: int) -> str:
     return "" if found == size else f"{file} has {found} bytes of {size}"
 
 
-def _changed(package: str, file: str, digest: str) -> str:
+def _explain_change(package: str, file: str, digest: str) -> str:
     try:
         with open(os.path.join(package, file), "rb") as source:
             content = source.read()
@@ -214,8 +214,8 @@ def _differing(module: str, binary: int, offered: int) -> str:
         pointer = ctypes.pythonapi.PyCapsule_GetPointer
         pointer.restype, pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
         table = ctypes.cast(pointer(capsule, f"{module}._C_API".encode()), ctypes.POINTER(ctypes.c_void_p))
-        tell = ctypes.CFUNCTYPE(ctypes.c_int)
-        found, offers = tell(table[0])(), tell(table[1])()
+        version_getter = ctypes.CFUNCTYPE(ctypes.c_int)
+        found, offers = version_getter(table[0])(), version_getter(table[1])()
     except (ImportError, AttributeError, ValueError, TypeError) as error:
         return f"the C interface of {module} cannot be read: {error}"
     if found == binary and offers >= offered:

@@ -88,7 +88,7 @@ def open_at_once(path: str | os.PathLike[str], flags: int) -> int:
         else:
             os.set_blocking(descriptor, True)
             return descriptor
-    raise OSError(errno.ENXIO, "it is a pipe and nobody reads it", os.fspath(path))
+    raise OSError(errno.ENXIO, "it is a pipe without a reader", os.fspath(path))
 
 
 @contextmanager

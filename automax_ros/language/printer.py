@@ -100,7 +100,7 @@ def _real(value: float) -> str:
     return f"{text}.0" if len(text.lstrip("-")) < REAL_DIGITS else f"{text}."
 
 
-def _declared(item: tree.Declared) -> str:
+def _declaration(item: tree.Declared) -> str:
     text = item.name if item.length is None else f"{item.name}:{item.length}"
     if item.subscripts:
         text += f"({_numbers(item.subscripts)})"
@@ -170,7 +170,7 @@ def _file(word: str, number: int, items: str, branch: str = "", line: int | None
 
 
 _SIMPLE: dict[type[tree.Statement], Callable[[Any], str]] = {
-    tree.Declaration: lambda it: f"{it.scope.value} {', '.join(_declared(item) for item in it.variables)}",
+    tree.Declaration: lambda it: f"{it.scope.value} {', '.join(_declaration(item) for item in it.variables)}",
     tree.Assignment: lambda it: f"{print_expression(it.target)} = {print_expression(it.value)}",
     tree.Goto: lambda it: f"GOTO {it.line}",
     tree.Gosub: lambda it: f"GOSUB {it.line}",

@@ -101,7 +101,7 @@ class PulseMultiplier(Instruction):
         elif found & _WORD_SIZE_INV:
             found |= self.Status & (_OUT_OVERFLOW | _LOST_PRECISION)
         else:
-            self.Out, errors = _out_of(self._multiplied())
+            self.Out, errors = _out_of(self._multiply())
             found |= errors
         self.Status = found | _INSTRUCT_FAULT if found else 0
 
@@ -128,7 +128,7 @@ class PulseMultiplier(Instruction):
             found |= _MULTIPLIER_INV
         return found
 
-    def _multiplied(self) -> int:
+    def _multiply(self) -> int:
         """Return INT_Out of this scan and store the remainder."""
         difference = sign_extended(self.In - self.previous_in, self.WordSize) if self.Mode else self.In
         multiplier = max(-MULTIPLIER_LIMIT, min(self.Multiplier, MULTIPLIER_LIMIT))

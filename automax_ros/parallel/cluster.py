@@ -159,7 +159,7 @@ def on_cluster(
     Raises:
         ClusterFault: Dask is not installed; the scheduler cannot be reached, or is lost; a worker has another version.
     """
-    with _connected(scheduler) as cluster:
+    with _connect(scheduler) as cluster:
         cluster.require_same()
         over: queue.SimpleQueue[int] = queue.SimpleQueue()
         futures = {number: cluster.submit(piece, number, over.put) for number, piece in enumerate(pieces)}
@@ -178,7 +178,7 @@ def on_cluster(
 
 
 @contextmanager
-def _connected(scheduler: str) -> Iterator[_Cluster]:
+def _connect(scheduler: str) -> Iterator[_Cluster]:
     """Connect to a scheduler while the block lasts; Dask's log messages are suppressed, our errors replace them."""
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     levels = [logger.level for logger in loggers]
@@ -211,7 +211,7 @@ class _Cluster:
         try:
             answers = within(SAME_S, lambda: self._client.run(installation, on_error="return"))
         except TimeoutError:
-            what = f"not every worker of the cluster has told within {SAME_S} s what is installed there"
+            what = f"not every worker of the cluster reported within {SAME_S} s what is installed there"
             hint = "one hangs, or its machine does: end it; what is not there is not asked"
             raise ClusterFault("AMX6858", self._scheduler, what, hint) from None
         for worker, found in answers.items():

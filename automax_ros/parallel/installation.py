@@ -30,7 +30,7 @@ class Installation:
     """The version of the package, a SHA-256 of all its sources, the interpreter and NumPy, and their results.
 
     ``results`` is a SHA-256 of values of functions of the C library and of NumPy, bit for bit: they differ in their
-    last bits from one C library or processor to the next (decision: whoever has others is refused, be it that the
+    last bits from one C library or processor to the next (decision: a machine with others is refused, be it that the
     work at hand asks for none). The defaults are those of an older version of the package.
     """
 

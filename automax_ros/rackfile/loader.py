@@ -46,7 +46,7 @@ from automax_ros.rackfile.sections.watch import read_watch
 
 _SLOT = re.compile(r"[0-9]{1,3}\Z")
 SLOTS_SCHEMA: Schema = entries(
-    "What stands in the rack, by slots 0 to 15.",
+    "The modules of the rack, by slots 0 to 15.",
     f"^0*({'|'.join(map(str, range(MAX_SLOT + 1)))})$",
     either(
         "A module.",
@@ -103,7 +103,7 @@ class SlotReader:
         if slot not in self._places:
             return slot
         first = self._places[slot]
-        held = f"holds {_described(self._placed[slot])}" if slot in self._placed else "is defined"
+        held = f"holds {_describe(self._placed[slot])}" if slot in self._placed else "is defined"
         message = f"slot {slot} already {held} (line {first.line})"
         self._findings.add("AMX6201", message, key.span, notes=(Note("first defined here", first),))
         return None
@@ -120,7 +120,7 @@ class SlotReader:
             return None
         kind = SUPPORTED[model]
         placed = self._placed[slot] = PlacedModule(slot, model, kind, key.span)
-        known, what = ("module", *kind.options), _described(placed)
+        known, what = ("module", *kind.options), _describe(placed)
         section = Section(node, what, known, self._findings, owner=f"{what} in slot {slot}")
         return kind.read(ModuleSection(slot, model, section, key.span, self._tasks, self._executive, self._plants))
 
@@ -147,7 +147,7 @@ class SlotReader:
         return None
 
 
-def _described(placed: PlacedModule) -> str:
+def _describe(placed: PlacedModule) -> str:
     return f"{placed.kind.word} {placed.model}"
 
 
@@ -232,7 +232,7 @@ def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
     path = Path(path)
     findings = ProblemList()
     source = SourceText(str(path), _text_of(path, findings))
-    return _loaded(source, TaskReader(path, allow_outside, findings), path, findings)
+    return _make_result(source, TaskReader(path, allow_outside, findings), path, findings)
 
 
 def load_stored(source: SourceText, path: Path) -> LoadResult:
@@ -241,10 +241,10 @@ def load_stored(source: SourceText, path: Path) -> LoadResult:
     ``path`` is the file's path in the configuration. No file is read.
     """
     findings = ProblemList()
-    return _loaded(source, TaskReader(None, False, findings), path, findings)
+    return _make_result(source, TaskReader(None, False, findings), path, findings)
 
 
-def _loaded(source: SourceText, tasks: TaskReader, path: Path, findings: ProblemList) -> LoadResult:
+def _make_result(source: SourceText, tasks: TaskReader, path: Path, findings: ProblemList) -> LoadResult:
     root = read_yaml(source.text, findings.yaml_flaw) if not findings.errors else None
     config = _read_rack(root, source.text, tasks, path, findings) if root is not None else None
     return LoadResult(config if not findings.errors else None, findings.in_order(), source)

@@ -110,7 +110,7 @@ class Replay:
         self.bag, self.new = bag, new
         self.native_elsewhere: tuple[str, ...] = ()
         self.reader = BagReader(bag)
-        self.rack, self.facts = stored or _stored(self.reader)
+        self.rack, self.facts = stored or _read_stored(self.reader)
         self.rack.require_tasks(options.only or ())
         chosen = [name for name in self.rack.task_names if options.only is None or name in options.only]
         self.sources: list[ReplaySource] = self.rack.replay_sources(chosen, new)
@@ -354,7 +354,7 @@ class Run:
         return task
 
 
-def _stored(reader: BagReader) -> Stored:
+def _read_stored(reader: BagReader) -> Stored:
     """Read the rack and the run of a recording. BagError, SourceRefused: as ``Replay``."""
     rack, facts = stored_rack(reader), run_facts(reader)
     require_tasks(reader.path, facts.table)

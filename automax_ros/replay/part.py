@@ -68,7 +68,7 @@ def replay_part(what: bytes, part: Part) -> PartResult:
     Raises:
         BagError: it cannot be read, or lacks something that the replay needs.
     """
-    replay = _AT_HAND.get(what) or _unpacked(what)
+    replay = _AT_HAND.get(what) or _unpack(what)
     files = len(replay.reader.files)
     base, entry = begun(replay, part.first)
     run = _run(replay, part)
@@ -123,7 +123,7 @@ def _run(replay: Replay, part: Part) -> Run:
 
 
 @lru_cache(maxsize=1)
-def _unpacked(what: bytes) -> Replay:
+def _unpack(what: bytes) -> Replay:
     """Return a replay from its serialized form, compiled once for all of its parts."""
     bag, new, options, stored = pickle.loads(what)
     assert isinstance(bag, Path)

@@ -134,7 +134,7 @@ class _SideBySide:
         run_jobs(pieces, where, self._take, self._is_over)
         results = [result for number in range(len(pieces)) if (result := self._result(number)) is not None]
         self._replay.native_elsewhere = tuple(text for result in results for text in result.native)
-        proven = self._proven()
+        proven = self._join_proven()
         if proven.failed is not None:
             self._require_worker(pieces[proven.failed])
         if proven.part is None:
@@ -160,7 +160,7 @@ class _SideBySide:
             return None
         return replay.report(added_up([*proven.counted, totals.since(base)]), replay.options)
 
-    def _proven(self) -> _Proven:
+    def _join_proven(self) -> _Proven:
         """Join the parts as far as each is the continuation of the one before, and nothing differs."""
         before: tuple[_Proven, CarriedState] | None = None
         proven = _Proven()

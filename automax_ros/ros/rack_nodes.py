@@ -51,7 +51,7 @@ from automax_ros.ros.base.node import SIM_TIME, ModuleNode, RackContext, RackLoc
 from automax_ros.ros.distributed.bus import DistributedMemory, ProcessLayout
 from automax_ros.ros.distributed.forwarding import RequestForwarder, operate_name
 from automax_ros.ros.distributed.presence import PresencePublisher
-from automax_ros.ros.intake.guard import MOST_TOLD
+from automax_ros.ros.intake.guard import MOST_SHOWN
 from automax_ros.ros.intake.intake import MessageIntake
 from automax_ros.ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.ros.nodes.operator import OperatorNode, OperatorServices
@@ -145,7 +145,7 @@ class RackNodes:
             arguments = split_arguments(sys.argv)[1]
         if simulated is not None:  # a rack that publishes /clock does not follow it
             arguments = arguments.without(SIM_TIME)
-        self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack), arguments)
+        self.rack = rack if isinstance(rack, Rack) else _load_rack(Path(rack), arguments)
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
         self.stream = RackStream(self.rack, run_id)
         self.health = Health() if manager is None else manager.health
@@ -255,7 +255,7 @@ class RackNodes:
                 self._start_together(self.bus, beginning)
             if self.rack.part.holds_common_memory:
                 self.nodes[0].declare_facts(run_facts(self.stream.run_id))
-            for node in (*self._own, *self._managed()):
+            for node in (*self._own, *self._managed_nodes()):
                 node.follow(ACTIVE)
 
     @property
@@ -382,7 +382,7 @@ class RackNodes:
     ) -> None:
         self.close()
 
-    def _managed(self) -> list[ManagedModuleNode]:
+    def _managed_nodes(self) -> list[ManagedModuleNode]:
         return [node for node in self.nodes if isinstance(node, ManagedModuleNode)]
 
     def _enter(self, action: Callable[[], None]) -> None:
@@ -398,14 +398,14 @@ class RackNodes:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
-            if self._context.ok():  # else ROS was shut down, and a report reaches nobody
+            if self._context.ok():  # else ROS was shut down, and a report reaches no subscriber
                 self._report(f"rack {self.rack.config.name} has ended", error)
 
     def _report(self, what: str, error: Exception) -> None:
         self.nodes[0].guard.report(what, error)
 
 
-def _loaded(path: Path, arguments: RosArguments) -> Rack:
+def _load_rack(path: Path, arguments: RosArguments) -> Rack:
     result = load(path)
     if result.config is None:
         raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
@@ -460,7 +460,7 @@ class LiveRack:
                 self.nodes.add_to(self._executor)
         except RCLError as error:
             self._leave()
-            text = str(error).split(", at /", 1)[0][:MOST_TOLD]
+            text = str(error).split(", at /", 1)[0][:MOST_SHOWN]
             hint = "do not give two of its topics or services one name (-r FROM:=TO)" if arguments.given else None
             raise RosUnavailable(f"the rack's nodes cannot be made: {text}", hint) from error
         except Exception:

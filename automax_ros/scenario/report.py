@@ -32,10 +32,10 @@ def report_of(rack: Rack, happened: Iterable[OperationRecord] = ()) -> dict[str,
     return {
         "rack": rack.config.name,
         "time_s": seconds(rack.now_ns),
-        "stopped": _stopped(rack.operations.stopped),
+        "stopped": _stop_record(rack.operations.stopped),
         "tasks": {task.name: _task(rack, task.name) for task in rack.tasks},
         "commons": {
-            variable.name: _nested(rack.memory.present(view), variable)
+            variable.name: _nest(rack.memory.present(view), variable)
             for view, variable in enumerate(rack.config.variables)
             if variable.bank is None
         },
@@ -52,7 +52,7 @@ def seconds(time_ns: int) -> float:
     return time_ns / NS_PER_S
 
 
-def _stopped(cause: StopCause | None) -> dict[str, Any] | None:
+def _stop_record(cause: StopCause | None) -> dict[str, Any] | None:
     if cause is None:
         return None
     return {"time_s": seconds(cause.time_ns), "code": cause.code, "task": cause.task or None, "reason": cause.reason}
@@ -82,7 +82,7 @@ def _entry(entry: LogEntry) -> dict[str, Any]:
     return {**found, "hardware": entry.hardware} if entry.hardware is not None else found
 
 
-def _nested(value: Value | Sequence[Value], variable: CommonVariable) -> Any:
+def _nest(value: Value | Sequence[Value], variable: CommonVariable) -> Any:
     """Return a variable's value, an array's as nested lists, one level for each subscript."""
     if isinstance(value, str) or not isinstance(value, Sequence):
         return value

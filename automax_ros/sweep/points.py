@@ -55,7 +55,7 @@ def read_varied(rack: Rack, text: str) -> Varied:
     """
     name, equals, given = text.partition("=")
     if not equals or not given.strip():
-        raise UserError(f"{quoted(text)} says no values", _FORM)
+        raise UserError(f"{quoted(text)} contains no values", _FORM)
     variable = variable_named(rack, name.strip())
     if not variable.is_number or ":" not in given:
         return Varied(variable, tuple(dict.fromkeys(variable.accepted(item.strip()) for item in given.split(","))))
@@ -67,7 +67,7 @@ def read_varied(rack: Rack, text: str) -> Varied:
         raise UserError(f"{variable.quantity.label}: {parts[0]} is not below {parts[1]}", "write the lower end first")
     if len(parts) == 2:
         return Varied(variable, (), low, high)
-    return Varied(variable, _between(variable, low, high, _count(variable, parts[2])))
+    return Varied(variable, _spread(variable, low, high, _count(variable, parts[2])))
 
 
 def grid(varied: Sequence[Varied]) -> list[Point]:
@@ -137,7 +137,7 @@ def _count(variable: Variable, text: str) -> int:
     return int(found)
 
 
-def _between(variable: Variable, low: Fraction, high: Fraction, count: int) -> tuple[Value, ...]:
+def _spread(variable: Variable, low: Fraction, high: Fraction, count: int) -> tuple[Value, ...]:
     """Return values at equal distances, both ends included; whole numbers are rounded, each once."""
     exact = (low + (high - low) * number / (count - 1) for number in range(count))
     if variable.is_whole:

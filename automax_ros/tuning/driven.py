@@ -42,7 +42,7 @@ class DrivenBlock:
         inputs.update(parameters)
         carrier, self._sign = dynamics.carrier(inputs)
         self._carrier = carrier.lower()
-        fixed, self._standing = _divided(block, carrier, parameters)
+        fixed, self._standing = _divide(block, carrier, parameters)
         self._instance = Instance(block, period_ns, **fixed)
         self._output = self._instance.results.index(dynamics.output.lower())
         self._rest = self._come_to_rest()
@@ -161,7 +161,7 @@ class _Bounds:
             )
 
 
-def _divided(block: Block, carrier: str, parameters: Mapping[str, Value]) -> tuple[dict[str, Value], dict[str, Value]]:
+def _divide(block: Block, carrier: str, parameters: Mapping[str, Value]) -> tuple[dict[str, Value], dict[str, Value]]:
     """Return the literals of a block and its other inputs, in lower case; signals other than the driving one are 0."""
     fixed: dict[str, Value] = {}
     standing: dict[str, Value] = {}

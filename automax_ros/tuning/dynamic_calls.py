@@ -124,14 +124,14 @@ class DynamicCall:
                 continue
             value = given.value
             if given.source is Source.UNKNOWN:
-                value = _unprogrammed(self.block, name)
+                value = _unprogrammed_value(self.block, name)
                 assumed.append(f"{name} = {source_text(value)} ({given.text})")
             if value is not None:
                 inputs[name] = value
         return inputs, assumed
 
 
-def _unprogrammed(block: Block, name: str) -> Value:
+def _unprogrammed_value(block: Block, name: str) -> Value:
     """Return the value of an input that the CALL does not program."""
     item = next(item for item in block.inputs if item.name == name)
     if item.default is not None:
@@ -151,9 +151,9 @@ def dynamic_calls(
         NoDynamicBlock: there is none on that line.
         ValueFault: no block uses a value.
     """
-    bound = _labelled(program)
+    bound = _label_blocks(program)
     if label is not None:
-        chosen = _chosen(label, bound, program)
+        chosen = _choose_label(label, bound, program)
         bound = {chosen: bound[chosen]}
     calls = [
         DynamicCall(name, item, _output(item), _parameters(program, item, values), inside)
@@ -207,7 +207,7 @@ def _settable(call: DynamicCall, *, driven: bool) -> list[Parameter]:
     return [call.parameters[name] for name in names]
 
 
-def _labelled(program: Program) -> dict[str, tuple[BoundCall, str]]:
+def _label_blocks(program: Program) -> dict[str, tuple[BoundCall, str]]:
     """Return the dynamic blocks by line, with the statement around each.
 
     A further CALL of one line counts from 2, whatever the first one is.
@@ -251,20 +251,20 @@ def _subroutines(program: Program) -> set[int]:
     return found
 
 
-def _chosen(label: str, bound: Mapping[str, tuple[BoundCall, str]], program: Program) -> str:
+def _choose_label(label: str, bound: Mapping[str, tuple[BoundCall, str]], program: Program) -> str:
     match = _LABEL.fullmatch(label.strip())
     if match is None:
-        raise NoDynamicBlock(f"{quoted(label)} is not a BASIC line such as 210 or 210.2", _listed(bound))
+        raise NoDynamicBlock(f"{quoted(label)} is not a BASIC line such as 210 or 210.2", _list_blocks(bound))
     line, number = int(match[1]), int(match[2] or 1)
     name = f"{line}" if number == 1 else f"{line}.{number}"
     if name in bound:
         return name
     there = {item.line for item in program.calls.values()}
     what = "that is not a dynamic block" if line in there else "there is no block on this line"
-    raise NoDynamicBlock(f"{name}: {what}", _listed(bound))
+    raise NoDynamicBlock(f"{name}: {what}", _list_blocks(bound))
 
 
-def _listed(bound: Mapping[str, tuple[BoundCall, str]]) -> str:
+def _list_blocks(bound: Mapping[str, tuple[BoundCall, str]]) -> str:
     if not bound:
         return "the task has no dynamic block"
     return "dynamic blocks are " + ", ".join(f"{name} {item.block.name}" for name, (item, _) in bound.items())

@@ -9,7 +9,7 @@ import sys
 import pytest
 from scenario.stimuli.helpers import DRAW, RACK, SPEED
 
-NOBODY = "it is a pipe and nobody reads it"
+NOBODY = "it is a pipe without a reader"
 
 
 @pytest.fixture(autouse=True)

@@ -146,7 +146,7 @@ def test_a_worker_that_hangs_before_it_tells_what_it_has_is_not_waited_for_for_e
     monkeypatch.setattr("automax_ros.parallel.cluster.SAME_S", 1)
     with cluster(tmp_path, 2) as found:
         found.workers[1].send_signal(signal.SIGSTOP)
-        with pytest.raises(ClusterFault, match="not every worker of the cluster has told within 1 s") as caught:
+        with pytest.raises(ClusterFault, match="not every worker of the cluster reported within 1 s") as caught:
             run_jobs(squares(3), Workers(scheduler=found.address))
     assert caught.value.code == "AMX6858"
 

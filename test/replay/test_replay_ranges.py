@@ -173,7 +173,7 @@ def test_missing_scans_are_told_and_the_next_state_goes_on(bag, tmp_path):
     assert report.identical
     work = report.tasks[1]
     assert work.notes == (
-        "scans 400 to 449 are missing before 4.939 s; it goes on from the next recorded state",
+        "scans 400 to 449 are missing before 4.939 s; it continues from the next recorded state",
         "462 scans could not be executed again: the state before them is not recorded",
     )
     assert work.scans == 2273 + 1 - 50 - 462

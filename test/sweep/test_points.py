@@ -87,8 +87,8 @@ def test_points_that_are_the_same_occur_once(rack: Rack):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("REF%", "'REF%' says no values"),
-        ("REF%=", "'REF%=' says no values"),
+        ("REF%", "'REF%' contains no values"),
+        ("REF%=", "'REF%=' contains no values"),
         ("REFF%=1", "the rack has no common variable 'REFF%'"),
         ("TABLE%=1", "TABLE% is an array"),
         ("LOPO.KP=1", "the rack has no task and no plant 'LOPO'"),

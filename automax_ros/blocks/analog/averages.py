@@ -52,7 +52,7 @@ def running_average_step(
     return data_valid, max_value, min_value, output, samples, position, taken, total, highest, lowest
 
 
-def _required(facts: Mapping[str, Value]) -> int:
+def _required_samples(facts: Mapping[str, Value]) -> int:
     return int(facts["required_samples"])
 
 
@@ -75,9 +75,9 @@ RUNNING_AVERAGE = Block(
         Output("OUTPUT", DataType.INTEGER, "O", "the average of the last samples"),
     ),
     states=(
-        State("samples", DataType.INTEGER, 0, size=_required),
-        State("position", DataType.INTEGER, 0, below=_required),
-        State("taken", DataType.INTEGER, 0, below=lambda facts: _required(facts) + 1),
+        State("samples", DataType.INTEGER, 0, size=_required_samples),
+        State("position", DataType.INTEGER, 0, below=_required_samples),
+        State("taken", DataType.INTEGER, 0, below=lambda facts: _required_samples(facts) + 1),
         State("total", DataType.DOUBLE, 0),
         State("highest", DataType.INTEGER, INT16_MIN),
         State("lowest", DataType.INTEGER, INT16_MAX),

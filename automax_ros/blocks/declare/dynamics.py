@@ -66,11 +66,11 @@ def bilinear(numerator: Sequence[float], denominator: Sequence[float], c: float)
     The numerator's degree is at most the denominator's.
     """
     order = len(denominator) - 1
-    b, a = _substituted(numerator, order, c), _substituted(denominator, order, c)
+    b, a = _substitute(numerator, order, c), _substitute(denominator, order, c)
     return tuple(value / a[0] for value in b), tuple(value / a[0] for value in a)
 
 
-def _substituted(polynomial: Sequence[float], order: int, c: float) -> list[float]:
+def _substitute(polynomial: Sequence[float], order: int, c: float) -> list[float]:
     """Return the polynomial of z**-1 of p(s) (1 + z**-1)**order for s = c (1 - z**-1)/(1 + z**-1)."""
     total = [0.0] * (order + 1)
     for power, factor in enumerate(reversed(polynomial)):

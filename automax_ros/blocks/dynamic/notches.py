@@ -142,11 +142,11 @@ def notchn_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
     numerator: Polynomial = (1.0, 0.0, wn * wn)
     denominator: Polynomial = (1.0, wn / q, wn * wn)
     if values["ORDER"] == 4.0:
-        numerator, denominator = _squared(numerator), _squared(denominator)
+        numerator, denominator = _square(numerator), _square(denominator)
     return mapped(numerator, denominator, mapping_constant(wn, period_s), period_s)
 
 
-def _squared(polynomial: Polynomial) -> Polynomial:
+def _square(polynomial: Polynomial) -> Polynomial:
     first, second, third = polynomial
     return (
         first * first,

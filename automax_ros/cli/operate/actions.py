@@ -53,7 +53,7 @@ class Mode(Enum):
     PRESS = "press"
 
 
-def _done(_: ServiceCall, __: Any) -> str:
+def _done_text(_: ServiceCall, __: Any) -> str:
     return "done"
 
 
@@ -71,7 +71,7 @@ class Action:
     add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
     read: Callable[[Any], Any] | None = None
     lines: Callable[[Any], Iterable[str]] = lambda _: ()
-    done_text: Callable[[ServiceCall, Any], str] = _done
+    done_text: Callable[[ServiceCall, Any], str] = _done_text
     mode: Mode = Mode.ONCE
     by_operator: bool = True
     acts: bool = False
@@ -154,12 +154,12 @@ def _names(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="+", metavar="NAME", help=NAMES_HELP)
 
 
-def _released(parser: argparse.ArgumentParser) -> None:
+def _add_release_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="what is forced")
     parser.add_argument("--all", action="store_true", help="end all forces")
 
 
-def _reloaded(parser: argparse.ArgumentParser) -> None:
+def _add_reload_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("task", metavar="TASK", help="the task")
     parser.add_argument("file", type=Path, metavar="FILE", help="its new source, on this computer")
     parser.add_argument(
@@ -176,7 +176,7 @@ def _control(name: str, help_text: str) -> Callable[[argparse.ArgumentParser], N
     return add
 
 
-def _moved(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
+def _move_calls(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
     def calls(given: argparse.Namespace) -> list[ServiceCall]:
         value = " ".join(given.value) or "true"
         fields = {"name": given.name, "control": given.control, "value": value}
@@ -240,7 +240,7 @@ def _clear(given: argparse.Namespace) -> list[ServiceCall]:
     ]
 
 
-def _stepped(parser: argparse.ArgumentParser) -> None:
+def _add_step_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "what", nargs="?", choices=("scan", "tick", "until"), default="scan", help="what is stepped (default: scan)"
     )
@@ -264,8 +264,8 @@ def _step(given: argparse.Namespace) -> list[ServiceCall]:
     return [ServiceCall("step", "automax_msgs/Step", fields, " ".join(filter(None, (given.what, given.of))))]
 
 
-def _powered(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", choices=("off", "on", "cycle"), help="cycle: off, and on again by itself")
+def _add_power_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("off", "on", "cycle"), help="cycle: off, then on again")
     parser.add_argument(
         "--off-for", type=seconds_above_0, default="1", metavar="S", help="cycle: for how long, s (default: 1)"
     )
@@ -282,7 +282,7 @@ def _power(given: argparse.Namespace) -> list[ServiceCall]:
     return [ServiceCall("power", "automax_msgs/Power", fields, given.what)]
 
 
-def _one(service: str, type_name: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
+def _single_call(service: str, type_name: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
     return lambda _: [ServiceCall(service, type_name)]
 
 
@@ -297,19 +297,21 @@ ACTIONS: Mapping[str, Action] = {
     "run": Action("put tasks into RUN", _each_task("run"), _tasks),
     "stop": Action("stop tasks", _each_task("stop"), _tasks),
     "delete": Action("take stopped tasks out; a reload brings them back", _each_task("delete"), _tasks),
-    "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger"), done_text=message_text),
-    "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger"), done_text=message_text),
-    "power": Action("switch the power off and on", _power, _powered),
-    "pause": Action("halt the rack: rack time stands still", _one("pause", "std_srvs/Trigger"), done_text=message_text),
+    "run-all": Action("put all tasks into RUN", _single_call("run_all", "std_srvs/Trigger"), done_text=message_text),
+    "stop-all": Action("STOP ALL", _single_call("stop_all", "std_srvs/Trigger"), done_text=message_text),
+    "power": Action("switch the power off and on", _power, _add_power_arguments),
+    "pause": Action(
+        "halt the rack: rack time is frozen", _single_call("pause", "std_srvs/Trigger"), done_text=message_text
+    ),
     "step": Action(
-        "let a halted rack go on by scans, ticks, or until a rack time at most 1 s later",
+        "continue a halted rack by scans, ticks, or until a rack time at most 1 s later",
         _step,
-        _stepped,
+        _add_step_arguments,
         fields_of,
         step_lines,
         acts=True,
     ),
-    "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger"), done_text=message_text),
+    "resume": Action("continue a halted rack", _single_call("resume", "std_srvs/Trigger"), done_text=message_text),
     "set": Action("write commons once", _each_assignment("set"), _assignments, done_text=value_text),
     "press": Action("hold BOOLEANs at TRUE for a while", _press_calls, add_press_arguments, mode=Mode.PRESS),
     "get": Action(
@@ -328,17 +330,21 @@ ACTIONS: Mapping[str, Action] = {
         mode=Mode.WATCH,
     ),
     "force": Action("hold commons or TASK.NAME at values against every write", _each_assignment("force"), _assignments),
-    "unforce": Action("end forces", _release, _released),
-    "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=values_of, lines=value_lines),
+    "unforce": Action("end forces", _release, _add_release_arguments),
+    "forces": Action(
+        "what is forced", _single_call("forces", "automax_msgs/ReadValues"), read=values_of, lines=value_lines
+    ),
     "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments, done_text=value_text),
-    "module": Action("move a switch of a module", _moved("module"), _control("SLOT", "the module's slot")),
+    "module": Action("move a switch of a module", _move_calls("module"), _control("SLOT", "the module's slot")),
     "plant": Action(
         "break, mend or load the plant of a drive",
-        _moved("plant"),
+        _move_calls("plant"),
         _control("PLANT", "its name in the rack's file"),
         more=_plant_verbs,
     ),
-    "reload": Action("replace the source of a task while the others run", _reload, _reloaded, done_text=reload_text),
+    "reload": Action(
+        "replace the source of a task while the others run", _reload, _add_reload_arguments, done_text=reload_text
+    ),
     "clear": Action("clear error logs, so that faulted tasks can run again", _clear, _some_tasks),
     "errors": Action(
         "the error logs",
@@ -350,14 +356,14 @@ ACTIONS: Mapping[str, Action] = {
         error_lines,
     ),
     "tasks": Action(
-        "how the tasks stand",
-        _one("tasks", "automax_msgs/ReadTasks"),
+        "the state of the tasks",
+        _single_call("tasks", "automax_msgs/ReadTasks"),
         read=lambda answer: [fields_of(item) for item in answer.tasks],
         lines=task_lines,
     ),
     "status": Action(
-        "how the rack stands, and what stopped it",
-        _one("status", "automax_msgs/ReadStatus"),
+        "the state of the rack, and what stopped it",
+        _single_call("status", "automax_msgs/ReadStatus"),
         read=fields_of,
         lines=status_lines,
     ),

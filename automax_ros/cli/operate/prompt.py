@@ -54,14 +54,14 @@ class _Shell:
             words = self._words(line)
             if words and words[0] in _QUIT:
                 break
-            failed |= words is None or (bool(words) and self._executed(words) != 0)
+            failed |= words is None or (bool(words) and self._execute(words) != 0)
             sys.stdout.flush()
         return failed
 
     def completions(self, text: str) -> list[str]:
         """Return the actions, commons and tasks that begin with a text; without a match, upper and lower case alike."""
         if self._names is None:
-            self._names = self._known()
+            self._names = self._known_names()
         words = [*ACTIONS, _HELP, _QUIT[0], *self._names]
         exact = [word for word in words if word.startswith(text)]
         return exact or [word for word in words if word.lower().startswith(text.lower())]
@@ -73,7 +73,7 @@ class _Shell:
             print(f"automax ctl: {error}: quote a name with a blank or a * in it", file=sys.stderr)
             return None
 
-    def _executed(self, words: list[str]) -> int:
+    def _execute(self, words: list[str]) -> int:
         from automax_ros.ros.clients.rack_client import Interrupted
 
         try:
@@ -97,7 +97,7 @@ class _Shell:
             print(f"  {name:10} {action.help}")
         print("  quit       leave; so does Ctrl-D. ACTION --help says what one takes")
 
-    def _known(self) -> list[str]:
+    def _known_names(self) -> list[str]:
         """Return the names of commons and tasks, as far as the rack answers."""
         wait_ns = self._given.timeout
         calls = [

@@ -66,7 +66,7 @@ def status_lines(data: Any) -> Iterable[str]:
     runs = f"{data['running']} run{ended}" if ended else f"{data['running']} of {count_of(data['tasks'], 'task')} run"
     yield f"rack {data['rack']}: {data['time_s']:.3f} s, {runs}{power}"
     if data["halted"]:
-        yield "halted: rack time stands still"
+        yield "halted: rack time is frozen"
     if data["stopped"]:
         code = f" (code {data['stopped_code']})" if data["stopped_code"] else ""
         yield f"stopped at {data['stopped_at_s']:.3f} s{code}: {data['stopped_reason']}"
@@ -89,7 +89,7 @@ def message_text(_: ServiceCall, answer: Any) -> str:
 
 def value_text(call: ServiceCall, answer: Any) -> str:
     """Return the text for a value that was written, or that the variable had already."""
-    if answer.before and answer.before == answer.now and answer.now == _written(call):
+    if answer.before and answer.before == answer.now and answer.now == _request_value(call):
         return f"{ALREADY} {call.fields['value'].strip()}"
     return "done"
 
@@ -99,7 +99,7 @@ def reload_text(_: ServiceCall, answer: Any) -> str:
     return f"done; {answer.lost}: --keep-state keeps what was tuned" if answer.lost else "done"
 
 
-def _written(call: ServiceCall) -> str:
+def _request_value(call: ServiceCall) -> str:
     """Return the value of a request as a program writes it, "" where it is not a value."""
     name, text = "".join(call.fields["name"].split()).partition("(")[0], call.fields["value"]
     value = value_of(text.strip(), type_of_name(name.partition("[")[0].upper()))

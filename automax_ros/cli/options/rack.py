@@ -55,7 +55,7 @@ def load_rack_file(path: Path, *, allow_outside: bool) -> LoadResult:
     Raises:
         UsageError: the file cannot be read, or is a task.
     """
-    path = _meant(path)
+    path = _find_rack_file(path)
     result = load(path, allow_outside=allow_outside)
     for item in result.diagnostics:
         if item.code == _CANNOT_BE_READ:
@@ -81,7 +81,7 @@ def size_of(rack: RackConfig) -> str:
     return ", ".join(count_of(number, thing) for number, thing in counts)
 
 
-def _meant(path: Path) -> Path:
+def _find_rack_file(path: Path) -> Path:
     """Return the rack file that an argument names, itself or by its folder."""
     if is_task_file(path):
         hint = f"`automax trace {path} --input IN.csv` runs a task alone; `automax new {path.parent}` makes a rack file"

@@ -23,8 +23,8 @@ def add_ros_arguments(parser: argparse.ArgumentParser) -> None:
         "--range",
         choices=RANGES,
         dest="discovery",
-        help="whom this program speaks to in its ROS domain (default: what ROS_AUTOMATIC_DISCOVERY_RANGE says, else "
-        "this host)",
+        help="which hosts this program communicates with in its ROS domain (default: what "
+        "ROS_AUTOMATIC_DISCOVERY_RANGE says, else this host)",
     )
     parser.set_defaults(ros=None)
 

@@ -114,7 +114,7 @@ def require_clock(path: Path, program: Program) -> None:
             f"{path} runs a drive's {program.cml.block.name}: the interrupts of a 57C406 begin its scans, not the clock"
         )
         raise UsageError(
-            message, "run it in a rack: automax run CONFIG --simulated; automax drive-check tells of its loop"
+            message, "run it in a rack: automax run CONFIG --simulated; automax drive-check reports on its loop"
         )
 
 

@@ -45,7 +45,7 @@ def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, str
     colour = wants_colour(stream)
     for item in in_order(diagnostics):
         text = visible(render(item, source))
-        write_control(stream, (_painted(item, text) if colour else text) + "\n")
+        write_control(stream, (_paint(item, text) if colour else text) + "\n")
 
 
 def print_warning_count(findings: Iterable[tuple[SourceText, Sequence[Diagnostic]]], of: str, path: Path) -> None:
@@ -67,7 +67,7 @@ def painted(text: str, colour: str) -> str:
     return f"\x1b[{colour}m{text}\x1b[0m"
 
 
-def _painted(item: Diagnostic, text: str) -> str:
+def _paint(item: Diagnostic, text: str) -> str:
     head = f"{item.severity.value}[{item.code}]"
     text = text.replace(head, painted(head, _COLOURS[item.severity]), 1)
     if item.hint:

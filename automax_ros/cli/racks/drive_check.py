@@ -95,8 +95,8 @@ def _execution(case: DriveCase | None) -> dict[str, str | None]:
 
 
 def _record(item: Finding) -> dict[str, Any]:
-    told = {"rule": item.rule, "verdict": item.verdict.value, "result": item.result, "formula": item.formula}
-    return {**told, "numbers": item.numbers, "values": dict(item.values)}
+    record = {"rule": item.rule, "verdict": item.verdict.value, "result": item.result, "formula": item.formula}
+    return {**record, "numbers": item.numbers, "values": dict(item.values)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

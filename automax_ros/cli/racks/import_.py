@@ -1,7 +1,7 @@
 """Make a rack file (.yaml) from the configuration task (.CNF) of a rack of Executive 2.1 or earlier.
 
-IODEF, MEMDEF, NVMEMDEF, RIODEF, NETDEF, GBLDEF, RNETDEF, ABDEF, MODDEF and TASK are read; lines that cannot be are told
-with their numbers, and the exit code is 1. No line of the old configuration says which module stands in a slot of I/O
+IODEF, MEMDEF, NVMEMDEF, RIODEF, NETDEF, GBLDEF, RNETDEF, ABDEF, MODDEF and TASK are read; other lines are reported with
+their numbers, and the exit code is 1. No line of the old configuration says which module stands in a slot of I/O
 points: --module says it, otherwise they become plain common variables and the rack file proposes modules.
 """
 

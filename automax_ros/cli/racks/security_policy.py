@@ -1,4 +1,4 @@
-"""Write the SROS 2 policy of a rack: who may say and hear what in its graph, and with --keystore the keys for it.
+"""Write the SROS 2 policy of a rack: who may publish and subscribe to what, and with --keystore the keys for it.
 
 The nodes are made, asked what they open, and destroyed; nothing runs. The policy has an enclave for the rack (with
 --distributed one for each process), one for those who record and watch, and one for those who operate. Without --output

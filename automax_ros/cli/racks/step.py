@@ -30,9 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax step``."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="the rack's YAML file")
     add_set_argument(parser)
-    parser.add_argument(
-        "--stimuli", type=Path, metavar="FILE", help="let happen what this YAML file says, by rack time"
-    )
+    parser.add_argument("--stimuli", type=Path, metavar="FILE", help="play this stimuli file, by rack time")
     parser.add_argument(
         "--ideal",
         action="store_true",
@@ -58,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     except StimuliRefused:
         return 1
     stepper.start(settings, happening.begin)
-    session = Session(stepper, _tell)
+    session = Session(stepper, _print_line)
     with interrupt.watching():
         failed = _obey_all(session, interrupt)
     return 1 if failed or happening.refused else 0
@@ -69,17 +67,17 @@ def _obey_all(session: Session, interrupt: Interrupt) -> bool:
     interactive = sys.stdin.isatty()
     if interactive:
         edit_lines(lambda text: completions(session, text))
-        _tell("help lists the commands, quit leaves")
-    _tell(place_text(session.stepper.rack, *session.stepper.place))
+        _print_line("help lists the commands, quit leaves")
+    _print_line(place_text(session.stepper.rack, *session.stepper.place))
     failed = False
     for line in typed_lines(PROMPT, interrupt) if interactive else sys.stdin:
-        failed |= not _obeyed(session, line)
+        failed |= not _execute_line(session, line)
         if session.over:
             break
     return failed and not interactive
 
 
-def _obeyed(session: Session, line: str) -> bool:
+def _execute_line(session: Session, line: str) -> bool:
     try:
         execute(session, line)
     except UserError as fault:
@@ -93,5 +91,5 @@ def _obeyed(session: Session, line: str) -> bool:
     return True
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     print(printable(line), flush=True)

@@ -79,10 +79,10 @@ class CommandFault(UserError):
 
 @dataclass
 class Session:
-    """The session with one stepped rack; ``tell`` prints a line. ``over`` is TRUE after ``quit``."""
+    """The session with one stepped rack; ``print_line`` prints a text as a line. ``over`` is TRUE after ``quit``."""
 
     stepper: Stepper
-    tell: Callable[[str], None]
+    print_line: Callable[[str], None]
     over: bool = False
     _watched: dict[str, Variable] = field(default_factory=dict)
 
@@ -109,24 +109,24 @@ class Session:
     def move(self, call: Callable[[], Halt]) -> None:
         """Run the rack by ``call``, and print its variables before and after."""
         before = self.values()
-        self.told(call(), before)
+        self.print_halt(call(), before)
 
-    def told(self, halt: Halt, before: dict[str, Value]) -> None:
+    def print_halt(self, halt: Halt, before: dict[str, Value]) -> None:
         """Print where the rack halted, and its variables before and after."""
         for task in self.stepper.rack.tasks:
             while task.printed:
-                self.tell(f"{task.name}: {printable(task.printed.popleft())}")
-        self.tell(place_text(self.stepper.rack, *self.stepper.place))
+                self.print_line(f"{task.name}: {printable(task.printed.popleft())}")
+        self.print_line(place_text(self.stepper.rack, *self.stepper.place))
         for line in halt_lines(halt):
-            self.tell(line)
+            self.print_line(line)
         for line in change_lines(before, self.values(), all_of_them=bool(self._watched)):
-            self.tell(line)
+            self.print_line(line)
         if halt.line:
             self.source([halt.task], around=0)
 
     def values(self) -> dict[str, Value]:
         """Return the values of the watched variables, or of all simple ones if none is watched."""
-        shown = self._watched.values() or self._all()
+        shown = self._watched.values() or self._simple_variables()
         return {variable.label: variable.read() for variable in shown}
 
     def watch(self, words: list[str]) -> None:
@@ -150,7 +150,7 @@ class Session:
             is_task = word.upper() in tasks
             found += self.stepper.variables.of_task(word.upper()) if is_task else [self.stepper.variables.find(word)]
         for line in table([[f"  {item.label}", source_text(item.read())] for item in found]):
-            self.tell(line)
+            self.print_line(line)
 
     def assign(self, words: list[str], write: Callable[[str, Value], None]) -> None:
         """Carry out NAME=VALUE; forces and values take effect between scans only."""
@@ -199,9 +199,9 @@ class Session:
         elif words:
             self.stepper.break_on("".join(words))
         for place in sorted(self.stepper.lines):
-            self.tell(f"  {place[0]}:{place[1]}")
+            self.print_line(f"  {place[0]}:{place[1]}")
         for label in self.stepper.watched:
-            self.tell(f"  {label}")
+            self.print_line(f"  {label}")
 
     def source(self, words: list[str], around: int = 5) -> None:
         """Print the source of a task around the line at which it is held."""
@@ -214,7 +214,7 @@ class Session:
         if len(words) > 1:
             shown = self._whole(words[1], "a line")
         for text in source_lines(sources[name].lines, shown, around):
-            self.tell(text)
+            self.print_line(text)
 
     def tasks(self) -> None:
         """Print the tasks with their status, scans and errors."""
@@ -225,13 +225,13 @@ class Session:
                 status, errors = STATUS_WORDS[item.task.status], str(item.task.errors.count)
                 rows.append([f"  {item.name}", module.config.name, status, str(item.statistics.scans), errors])
         for line in table(rows, right={3, 4}):
-            self.tell(line)
+            self.print_line(line)
 
     def errors(self) -> None:
         """Print the error logs."""
         for task in self.stepper.rack.tasks:
             for entry in task.errors.entries:
-                self.tell(f"  {task.name}: {entry.describe()}")
+                self.print_line(f"  {task.name}: {entry.describe()}")
 
     def go(self, words: list[str]) -> None:
         """Run the rack, for a time if one is given."""
@@ -249,7 +249,7 @@ class Session:
         """End the session."""
         self.over = True
 
-    def _all(self) -> Iterator[Variable]:
+    def _simple_variables(self) -> Iterator[Variable]:
         """Yield the simple commons, and the locals of the held task, or of all tasks if none is held."""
         rack, (task, _) = self.stepper.rack, self.stepper.place
         for variable in rack.config.declared:
@@ -320,7 +320,7 @@ def completions(session: Session, text: str) -> list[str]:
 def _help(session: Session, words: list[str]) -> None:
     names = [word.lower() for word in words if word.lower() in COMMANDS] or list(COMMANDS)
     for line in table([[f"  {COMMANDS[name].usage}", COMMANDS[name].text] for name in names]):
-        session.tell(line)
+        session.print_line(line)
 
 
 def _operations(session: Session) -> Operations:

@@ -99,7 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration", type=seconds_above_0, default=USUAL_DURATION_NS, metavar="S", help="of a run (default: 10)"
     )
     parser.add_argument(
-        "--stimuli", type=Path, metavar="FILE", help="let happen in each run what this YAML file says (docs/stimuli.md)"
+        "--stimuli", type=Path, metavar="FILE", help="play this stimuli file in each run (docs/stimuli.md)"
     )
     parser.add_argument(
         "--output",
@@ -152,7 +152,7 @@ def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
     rack = Rack(config)
     warn(rack)
     stimulation(rack, arguments.stimuli, allow_outside=arguments.allow_outside)
-    varied = _varied(rack, arguments.vary)
+    varied = _read_varied(rack, arguments.vary)
     points = _points(varied, arguments)
     measures = _read("--measure", lambda: read_measures(" ".join(arguments.measure), config, arguments.duration))
     best, greatest = best_of(arguments.best, config, measures, arguments.duration)
@@ -210,7 +210,7 @@ def _rows(sweep: _Sweep, stop: StopRequest) -> list[Row]:
     return [found[number] for number in sorted(found)]
 
 
-def _varied(rack: Rack, texts: list[str]) -> list[Varied]:
+def _read_varied(rack: Rack, texts: list[str]) -> list[Varied]:
     found: dict[str, Varied] = {}
     for text in texts:
         item = _read("--vary", partial(read_varied, rack, text))

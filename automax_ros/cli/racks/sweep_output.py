@@ -103,7 +103,7 @@ def _maps(across: _Axis, up: _Axis, measures: Sequence[_Axis], marked: Sequence[
         drawn = axis.pcolormesh(columns, lines, cells, shading="nearest")
         figure.colorbar(drawn, ax=axis).ax.tick_params(labelsize=_FONT)
         axis.plot([across.numbers[at] for at in marked], [up.numbers[at] for at in marked], "o", color=_BEST)
-        axis.set_title(_folded(measure.label, _WIDTH_IN), fontsize=_FONT + 1)
+        axis.set_title(_fold(measure.label, _WIDTH_IN), fontsize=_FONT + 1)
         _name(axis, across, up)
     return figure
 
@@ -126,8 +126,8 @@ def _mark(axis: Any, across: _Axis, up: _Axis, marked: Sequence[int]) -> None:
 def _name(axis: Any, across: _Axis, up: _Axis) -> None:
     _, _, width, height = axis.get_position().bounds
     inches = axis.figure.get_size_inches()
-    axis.set_xlabel(_folded(across.label, width * inches[0]), fontsize=_FONT)
-    axis.set_ylabel(_folded(up.label, height * inches[1]), fontsize=_FONT)
+    axis.set_xlabel(_fold(across.label, width * inches[0]), fontsize=_FONT)
+    axis.set_ylabel(_fold(up.label, height * inches[1]), fontsize=_FONT)
     for texts, set_ticks in ((across.texts, axis.set_xticks), (up.texts, axis.set_yticks)):
         if texts:
             every = -(-len(texts) // _MOST_TICKS)
@@ -136,7 +136,7 @@ def _name(axis: Any, across: _Axis, up: _Axis) -> None:
     axis.grid(alpha=0.3)
 
 
-def _folded(text: str, inches: float) -> str:
+def _fold(text: str, inches: float) -> str:
     """Return a label in as many lines as it needs to be no longer than its axis."""
     lines = textwrap.wrap(text, max(_LEAST_LETTERS, int(inches * _LETTERS_AN_INCH)), break_on_hyphens=False)
     return "\n".join(map(plain, lines))

@@ -139,7 +139,7 @@ def _verdict(content: Mapping[str, Any]) -> list[str]:
     return [*lines, *(f"  hint: {hint}" for hint in hints if hint)]
 
 
-_GAPS = "  a replay goes on from the next image of memory and the next state of each task"
+_GAPS = "  a replay continues from the next image of memory and the next state of each task"
 
 
 def _section(title: str, rows: Sequence[Sequence[str]]) -> list[str]:
@@ -272,8 +272,8 @@ def _task(info: BagInfo, name: str, facts: TaskFacts | None) -> dict[str, Any]:
 
 def _operation(info: BagInfo, item: Operation) -> dict[str, Any]:
     start = info.table.stamp if info.table else 0
-    told = {"at": (item.stamp - start) / NS_PER_S, "what": item.what, "task": item.task, "ok": item.ok}
-    return {**told, "reason": item.reason, "detail": item.detail}
+    fields = {"at": (item.stamp - start) / NS_PER_S, "what": item.what, "task": item.task, "ok": item.ok}
+    return {**fields, "reason": item.reason, "detail": item.detail}
 
 
 def _variables(info: BagInfo) -> dict[str, Any]:

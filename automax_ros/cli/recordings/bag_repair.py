@@ -2,7 +2,7 @@
 
 The recording itself is never changed: what can be saved goes into a new folder, with index, summary and
 metadata.yaml, and what was lost is reported. A sound recording is left alone. Exit code 0: the recording is sound, or a
-repaired one stands next to it; 1: it is not sound all the same, for a reason that no repair mends; 2: nothing of it can
+repaired one stands next to it; 1: it is still not sound, for a reason that repair cannot fix; 2: nothing of it can
 be used.
 """
 
@@ -50,7 +50,7 @@ def _text(report: RepairReport) -> str:
         lines += [f"{bag}: {printable(text)}" for text in report.problems]
         lines.append(f"kept: {_contents(report)}")
     if report.left is not None:
-        lines.append(f"not sound all the same, and no repair mends it: {printable(str(report.left))}")
+        lines.append(f"still not sound, and repair cannot fix it: {printable(str(report.left))}")
     if report.output is not None:
         lines.append(f"{'copied' if report.sound else 'repaired'}: {printable(str(report.output))}")
     return "\n".join(lines)
@@ -72,7 +72,7 @@ def _file_lines(file: FileReport) -> list[str]:
         return [f"{name}: sound, {count_of(file.contents.messages, 'message')}"]
     lines = [f"{name}: {printable(text)}" for text in file.damage]
     lines.append(
-        f"{name}: {file.lost_bytes} of {count_of(file.size, 'byte')} belong to no whole record, "
+        f"{name}: {file.lost_bytes} of {count_of(file.size, 'byte')} belong to no complete record, "
         f"{count_of(file.lost_chunks, 'chunk')} cut or damaged; "
         f"{count_of(file.dropped_messages, 'message')} dropped as half-present, malformed or without definition, "
         f"{file.dropped_scans} of them {'a scan' if file.dropped_scans == 1 else 'scans'}"

@@ -51,13 +51,13 @@ def run(arguments: argparse.Namespace) -> int:
     if not as_numpy and arguments.output.suffix.lower() != ".csv" and not is_direct(arguments.output):
         raise UsageError(f"{arguments.output}: a table is written as .csv or .npz", "name it OUT.csv or OUT.npz")
     with ended_by_signals(), share_shown("export") as progress:
-        rows = _written(arguments, as_numpy, progress)
+        rows = _write(arguments, as_numpy, progress)
     if sys.stderr.isatty():
         print(f"{arguments.output}: {count_of(rows, 'row')}", file=sys.stderr)
     return 0
 
 
-def _written(arguments: argparse.Namespace, as_numpy: bool, progress: Progress) -> int:
+def _write(arguments: argparse.Namespace, as_numpy: bool, progress: Progress) -> int:
     table = _table(arguments, progress)
     if as_numpy:
         from automax_ros.recordings.tables.export_npz import write_npz  # NumPy takes a while to load

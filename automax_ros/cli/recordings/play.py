@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         if found is None:
             return 0
         _choose(found, arguments.topics)
-        renaming = Renaming(found.spaces, target or _placed(found.spaces, ros))
+        renaming = Renaming(found.spaces, target or _target_namespace(found.spaces, ros))
         return _play(found, renaming, rate, arguments, stop, domain)
 
 
@@ -140,7 +140,7 @@ class _Show:
     def play(self, arguments: argparse.Namespace) -> int:
         player = self._player
         player.open()
-        playable = self._tell_skipped()
+        playable = self._report_skipped()
         if not playable:
             raise BagError("AMX6840", self._found.bag.path, "no topic of the recording can be played")
         for space in player.look_around(lambda: self._stop.requested, for_racks=not arguments.force):
@@ -163,14 +163,14 @@ class _Show:
         )
         return 0
 
-    def _tell_skipped(self) -> int:
+    def _report_skipped(self) -> int:
         """Print the topics that cannot be played, and return how many can."""
         faults = [topic for topic in self._found.topics.values() if topic.fault]
-        told = [topic for topic in faults if topic.fault != NOT_CHOSEN]
-        for topic in told[:_SKIPPED_NAMED]:
+        skipped = [topic for topic in faults if topic.fault != NOT_CHOSEN]
+        for topic in skipped[:_SKIPPED_NAMED]:
             self._line.message(f"skipped {printable(topic.name)}: {printable(topic.fault)}")
-        if len(told) > _SKIPPED_NAMED:
-            self._line.message(f"skipped {len(told) - _SKIPPED_NAMED} more topics")
+        if len(skipped) > _SKIPPED_NAMED:
+            self._line.message(f"skipped {len(skipped) - _SKIPPED_NAMED} more topics")
         return len(self._found.topics) - len(faults)
 
     def _show(self) -> None:
@@ -208,7 +208,7 @@ def _rate(text: str) -> float:
     return rate
 
 
-def _placed(spaces: Collection[str], ros: RosArguments) -> str | None:
+def _target_namespace(spaces: Collection[str], ros: RosArguments) -> str | None:
     """Return the namespace to play into if ROS arguments give one: in it, under the rack's own name (decision)."""
     if not ros.namespace:
         return None

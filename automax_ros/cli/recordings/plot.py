@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output", "-o", type=Path, required=True, metavar="FILE", help="the picture: FILE.png, .svg or .pdf"
     )
     add_window_arguments(parser)
-    parser.add_argument("--separate", action="store_true", help="a lane of its own for each analog variable")
+    parser.add_argument("--separate", action="store_true", help="a separate lane for each analog variable")
     parser.add_argument(
         "--size", type=_size, default=(_DEFAULT_WIDTH_PX, 0), metavar="WxH", help="size in pixels, such as 1600x900"
     )

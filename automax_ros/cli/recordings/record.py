@@ -52,9 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", "-o", type=Path, metavar="DIR", help="the new rosbag2 folder (default: rack and time)"
     )
-    parser.add_argument(
-        "--duration", type=seconds_above_0, metavar="S", help="seconds after which the recording ends by itself"
-    )
+    parser.add_argument("--duration", type=seconds_above_0, metavar="S", help="seconds after which the recording ends")
     parser.add_argument("--tasks", metavar="A,B", help="record scans and states of these tasks only (default: all)")
     parser.add_argument(
         "--split-mb", metavar="MB", help="begin a new file when one reaches MB megabytes (1 MB is 10^6 bytes)"
@@ -119,10 +117,10 @@ class _Session:
     def record(
         self, folder: Path, wait_ns: int, duration_ns: int | None, how: _Storing, own_files: list[RackFile]
     ) -> int:
-        table = self._found(wait_ns)
+        table = self._find_rack(wait_ns)
         if table is None:
             return 0
-        chosen = _chosen(table, how.tasks)
+        chosen = _choose_tasks(table, how.tasks)
         self._expects_scans = bool(_tasks(table))
         files = self._files(own_files)
         if self._stop.requested:
@@ -145,13 +143,15 @@ class _Session:
         self._notes(recording)
         return self._summary(recording, folder)
 
-    def _found(self, wait_ns: int) -> VariableTable | None:
+    def _find_rack(self, wait_ns: int) -> VariableTable | None:
         try:
             table = self._recorder.find(wait_ns, lambda: self._stop.requested)
         except CdrError as error:
             raise UsageError(f"{self._space}/variables is not a rack's table: {error}") from error
         if not self._recorder.binding.knows_senders:
-            self._line.message("warning: this ROS 2 does not tell who sends: what others publish is recorded too")
+            self._line.message(
+                "warning: this ROS 2 does not identify senders: messages of other programs are recorded too"
+            )
         if table is not None or self._stop.requested:
             return table
         there = self._recorder.racks()
@@ -293,7 +293,7 @@ def _tasks(table: VariableTable) -> list[str]:
     return [writer.name for writer in table.writers if writer.kind == WriterKind.TASK]
 
 
-def _chosen(table: VariableTable, text: str | None) -> set[str] | None:
+def _choose_tasks(table: VariableTable, text: str | None) -> set[str] | None:
     if text is None:
         return None
     known = _tasks(table)

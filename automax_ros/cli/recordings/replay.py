@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
         if options.only is not None and name not in options.only:
             raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
     try:
-        report = _replayed(Replay(arguments.bag, new, options), where, arguments)
+        report = _run_replay(Replay(arguments.bag, new, options), where, arguments)
     except SourceRefused as error:
         for source, diagnostics in error.findings:
             print_diagnostics(diagnostics, source, sys.stderr)
@@ -100,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if report.identical else 1
 
 
-def _replayed(replay: Replay, where: Workers, arguments: argparse.Namespace) -> ReplayReport:
+def _run_replay(replay: Replay, where: Workers, arguments: argparse.Namespace) -> ReplayReport:
     for source, diagnostics in replay.warnings:
         print_warning_count([(source, diagnostics)], Path(source.name).name, Path(source.name))
     with share_shown("replay") as show:

@@ -1,4 +1,4 @@
-"""Report a run from a recording: one HTML page that is whole by itself, and a picture.
+"""Report a run from a recording: one self-contained HTML page, and a picture.
 
 Of every drive of the rack, or of the one whose current minor loop is in a task: speed, current reference and feedback,
 DELTA, bridge, faults and errors with their times, rms current and energies, and what happened in which order. Of a rack
@@ -77,14 +77,14 @@ def image(name: str, picture: bytes) -> str:
     return f'<img alt="{plain(name)} over time" src="data:image/png;base64,{encoded}">'
 
 
-def sequence(events: Sequence[Event], untold: int) -> list[str]:
-    """Return the events as a table, empty without events; ``untold`` is the number of events not listed."""
+def sequence(events: Sequence[Event], omitted: int) -> list[str]:
+    """Return the events as a table, empty without events; ``omitted`` is the number of events not listed."""
     if not events:
         return []
     found = [(f"{item.time_s:.4f}", item.kind, item.text) for item in events]
     kinds = [item.kind for item in events]
     head = ("s", "", "what happened")
-    return ["<h3>Sequence of operations</h3>", *rows(head, found, numbers=(0,), classes=kinds, untold=untold)]
+    return ["<h3>Sequence of operations</h3>", *rows(head, found, numbers=(0,), classes=kinds, omitted=omitted)]
 
 
 def rows(
@@ -93,7 +93,7 @@ def rows(
     *,
     numbers: Iterable[int],
     classes: Sequence[str] = (),
-    untold: int = 0,
+    omitted: int = 0,
 ) -> list[str]:
     """Return a table; ``numbers`` are the columns with numbers, ``classes`` the CSS classes of its rows."""
     right = set(numbers)
@@ -108,7 +108,7 @@ def rows(
         )
         lines.append(f"<tr{kind}>{cells}</tr>")
     lines.append("</table>")
-    more = max(0, len(found) - MOST_ROWS) + untold
+    more = max(0, len(found) - MOST_ROWS) + omitted
     if more:
         lines.append(f'<p class="note">And {more} more.</p>')
     return lines
@@ -143,7 +143,7 @@ def rack_page(report: RackReport, recording: str, picture: bytes | None) -> str:
     ]
     parts = [image(shown.rack, picture)] if picture is not None else []
     parts += ["<h3>Tasks</h3>", *rows(("task", "where", "period, ms", "scans", "errors"), found, numbers=(2, 3, 4))]
-    parts += sequence(report.happened.events, report.happened.untold)
+    parts += sequence(report.happened.events, report.happened.omitted)
     return document(shown.rack, _of(recording, shown.start_s, shown.end_s), parts)
 
 
@@ -160,7 +160,7 @@ def _drive(run: DriveRun, errors: int, picture: bytes | None) -> list[str]:
     else:
         parts.append('<p class="note">The recording holds no course of this drive.</p>')
     parts += ["<h3>Totals</h3>", *rows(("", ""), totals(run, errors), numbers=())]
-    parts += [*_faults(run), *sequence(run.events, run.untold), *_notes(run), "</section>"]
+    parts += [*_faults(run), *sequence(run.events, run.omitted), *_notes(run), "</section>"]
     return parts
 
 
@@ -234,7 +234,7 @@ def _faults(run: DriveRun) -> list[str]:
         for item in run.faults
     ]  # fmt: skip
     head = ("from, s", "to, s", "fault", "output", "variable")
-    return ["<h3>Faults</h3>", *rows(head, found, numbers=(0, 1), untold=run.fault_count - len(run.faults))]
+    return ["<h3>Faults</h3>", *rows(head, found, numbers=(0, 1), omitted=run.fault_count - len(run.faults))]
 
 
 def _notes(run: DriveRun) -> list[str]:

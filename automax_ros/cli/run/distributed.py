@@ -73,7 +73,7 @@ def _posts(plan: RunPlan, processes: Sequence[RackProcess], arguments: argparse.
         own = ["--state", str(plan.state / process.name)] if plan.state is not None else []
         own += ["--await-recorder"] if plan.record is not None else []
         own += (
-            _given("--set", arguments.settings) + _given("--watch", arguments.watch)
+            _option_words("--set", arguments.settings) + _option_words("--watch", arguments.watch)
             if process.holds_common_memory
             else []
         )
@@ -105,7 +105,7 @@ def _ros(plan: RunPlan, arguments: argparse.Namespace) -> list[str]:
     return [*discovery, *plan.ros.command_line]
 
 
-def _given(option: str, values: Sequence[str] | None) -> list[str]:
+def _option_words(option: str, values: Sequence[str] | None) -> list[str]:
     return [f"{option}={value}" for value in values or ()]
 
 
@@ -132,19 +132,19 @@ class _Watch:
         self._summaries: dict[str, Summary] = {}
         self._reports: dict[str, Any] = {}
 
-    def receive(self, name: str, told: ProcessMessage) -> None:
+    def receive(self, name: str, message: ProcessMessage) -> None:
         """Show a message of a process; progress is shown merged, summaries and reports are kept for the end."""
-        if isinstance(told, TextLine):
-            self.message(f"{name}: {told.text}")
-        elif isinstance(told, Progress):
-            self._progress[name] = told
+        if isinstance(message, TextLine):
+            self.message(f"{name}: {message.text}")
+        elif isinstance(message, Progress):
+            self._progress[name] = message
             memory_progress = self._progress.get(self._memory_process)
             if memory_progress is not None and memory_progress.now_ns >= NS_PER_S and self._screen.due():
                 self._screen.progress(merged_progress(_in_order(self._names, self._progress)))
-        elif isinstance(told, Summary):
-            self._summaries[name] = told
-        elif told.report:  # the report of a process that has not begun is empty
-            self._reports[name] = told.report
+        elif isinstance(message, Summary):
+            self._summaries[name] = message
+        elif message.report:  # the report of a process that has not begun is empty
+            self._reports[name] = message.report
 
     def print_error(self, name: str, line: str) -> None:
         """Show a line that a process has written on standard error."""

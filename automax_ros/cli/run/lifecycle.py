@@ -30,7 +30,7 @@ from automax_ros.runtime.health import Health
 
 _LOOK_S = 0.05
 """Longest wait while no rack runs."""
-_MOST_TOLD = 100
+_MOST_SHOWN = 100
 """Most findings of a file that are logged."""
 _FAULTS = (RackError, StimuliRefused, BagError, UserError)
 """Errors that keep a rack from being configured and that the user can correct."""
@@ -77,7 +77,7 @@ class LifecycleRunner:
         self._is_starting = True
         for transition in (CONFIGURE, ACTIVATE):
             if not self._stop.requested:
-                self._node.change(transition, self._started)
+                self._node.change(transition, self._raise_start_error)
         self._is_starting = False
 
     def run(self) -> None:
@@ -108,7 +108,7 @@ class LifecycleRunner:
     # Duties
 
     def refusal(self, transition: str) -> str | None:
-        """Without an operator only a rack that was never active may be managed (decision: somebody must start it).
+        """Without an operator only a rack that was never active may be managed (decision: else nothing could start it).
 
         A distributed rack is configured and ended by starting and ending its processes (decision).
         """
@@ -126,12 +126,12 @@ class LifecycleRunner:
         except WorkInterrupted as cut:
             raise TransitionRefused("the program ends") from cut
         except _FAULTS as fault:
-            self._tell(fault)
+            self._report_fault(fault)
             raise TransitionRefused(str(fault) or "the stimuli have errors") from fault
 
     def activate(self) -> Pending | None:
         """Start the rack, or put all of its tasks into RUN again."""
-        session = self._expected()
+        session = self._expect_session()
         if session.has_begun:
             return self._operate(session.live.nodes.activate)
         self._start(session)
@@ -140,7 +140,7 @@ class LifecycleRunner:
 
     def deactivate(self) -> None:
         """STOP ALL."""
-        self._operate(self._expected().live.nodes.deactivate)
+        self._operate(self._expect_session().live.nodes.deactivate)
 
     def cleanup(self) -> None:
         """Remove the nodes of the modules from the graph; save non-volatile values and finish the recording."""
@@ -162,7 +162,7 @@ class LifecycleRunner:
         if plan.config.namespace != self._managed.namespace:
             now, before = plan.config.namespace, self._managed.namespace
             raise RackError(f"the rack is called {now} now, this is the node of {before}: start the program again")
-        plan = replace(plan, record=_numbered(plan.record, self._sessions + 1))
+        plan = replace(plan, record=_numbered_folder(plan.record, self._sessions + 1))
         self._session = LiveSession(plan, self._process, self._node, self._stop, self._domain)
         self._sessions += 1
 
@@ -181,12 +181,12 @@ class LifecycleRunner:
     def _is_wanted(self) -> bool:
         return self._stop.requested or self._ended or bool(self._asked)
 
-    def _started(self, error: Exception | None) -> None:
+    def _raise_start_error(self, error: Exception | None) -> None:
         """Raise the error that prevented the autostart, unless a signal caused it."""
         if error is not None and not self._stop.requested:
             raise error.__cause__ or error
 
-    def _expected(self) -> LiveSession:
+    def _expect_session(self) -> LiveSession:
         assert self._session is not None, "only a configured node has this transition"
         return self._session
 
@@ -196,7 +196,7 @@ class LifecycleRunner:
         except OperationRefused as refused:
             raise TransitionRefused(str(refused)) from refused
 
-    def _tell(self, fault: Exception) -> None:
+    def _report_fault(self, fault: Exception) -> None:
         """Log why the rack cannot be configured; at an autostart the command prints it as it ends."""
         findings = getattr(fault, "findings", ())
         if not self._is_starting:
@@ -205,11 +205,11 @@ class LifecycleRunner:
             if str(fault):
                 print(f"automax run: {fault}", file=sys.stderr, flush=True)
         found = [(item, where) for where, items in findings for item in items]
-        for item, where in found[:_MOST_TOLD]:
+        for item, where in found[:_MOST_SHOWN]:
             self._node.get_logger().error(render(item, where))
 
 
-def _numbered(folder: Path | None, number: int) -> Path | None:
+def _numbered_folder(folder: Path | None, number: int) -> Path | None:
     """Return the folder in which the nth run of a program is recorded: DIR, DIR_2, DIR_3 (decision)."""
     if folder is None or number == 1:
         return folder

@@ -59,7 +59,7 @@ class LiveSession:
             self._stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
         self._state = SavedState(rack, plan.state_folder)
         self._operated = OperationLog(lambda: self._stimulation.is_acting)
-        self._told: StopCause | None = None
+        self._reported_cause: StopCause | None = None
         self._ending = ExitStack()
         try:
             self.live = LiveRack(
@@ -125,16 +125,16 @@ class LiveSession:
         finally:
             self._ending.close()
         if self.has_begun:
-            self._tell_end()
+            self._report_end()
         unsaved = self._state.failed and self.plan.state is not None
         failed = self._recording.failed or unsaved or self._stimulation.refused > 0
         return conclude(self.rack, self.plan, report, failed=failed)
 
-    def _tell_end(self) -> None:
+    def _report_end(self) -> None:
         self._state.end()
         for text in self._state.news():
             self._display.message(text)
-        self._recording.tell()
+        self._recording.report_failure()
         self._display.finish(self.plan.record, complete=not self._recording.failed)
 
     def _recorder(self) -> Recorder | None:
@@ -161,13 +161,13 @@ class LiveSession:
 
     def _all_are_there(self, stop: StopRequest) -> bool:
         """Wait for the other processes of a distributed rack; FALSE where a stop is requested first."""
-        told_ns = time.monotonic_ns() + PATIENCE_NS
+        report_at_ns = time.monotonic_ns() + PATIENCE_NS
 
         def should_stop() -> bool:
-            nonlocal told_ns
+            nonlocal report_at_ns
             missing = self.live.bus.missing if self.live.bus is not None else []
-            if missing and time.monotonic_ns() > told_ns:
-                told_ns = _NEVER_NS
+            if missing and time.monotonic_ns() > report_at_ns:
+                report_at_ns = _NEVER_NS
                 self._display.message(f"waiting for {', '.join(missing)}")
             return stop.requested
 
@@ -176,14 +176,14 @@ class LiveSession:
     def _chores(self, now_ns: int) -> None:
         self._display.update(now_ns)
         cause = self.rack.operations.stopped
-        if cause is not None and cause != self._told:
+        if cause is not None and cause != self._reported_cause:
             self._display.message(f"{cause.title}: {cause.reason}")
-        self._told = cause
+        self._reported_cause = cause
         self._state.update(now_ns)
         for text in [*self._state.news(), *self._stimulation.news()]:
             self._display.message(text)
         self._recording.flush(now_ns)
-        self._recording.tell()
+        self._recording.report_failure()
 
 
 def _opening(plan: RunPlan, rack: Rack, domain: int) -> str:
@@ -206,8 +206,8 @@ def _time(plan: RunPlan) -> str:
     """Return which clock the rack follows, on a separate line; empty for the wall clock."""
     if plan.simulated is not None:
         rate = plan.simulated.rate
-        pace = "as fast as it goes" if rate is None else f"{rate:g} times the wall clock"
-        return f"\nrack time is simulated, {pace}, and told on /clock"
+        pace = "as fast as possible" if rate is None else f"{rate:g} times the wall clock"
+        return f"\nrack time is simulated, {pace}, and published on /clock"
     if follows_clock(plan.ros, plan.config.namespace):
         return "\nrack time follows /clock, and begins with its first message"
     return ""

@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--stimuli",
         type=Path,
         metavar="FILE",
-        help="let happen what this YAML file says, by rack time: give it to every process of the rack",
+        help="play this stimuli file, by rack time: give it to every process of the rack",
     )
     parser.add_argument("--report", type=Path, metavar="FILE.json", help="write how the run ended for this process")
     add_native_arguments(parser)

@@ -44,23 +44,23 @@ class ProcessOutput(TerminalOutput):
 
     def progress(self, progress: Progress) -> None:
         """Send the progress of the process."""
-        _tell("progress", dataclasses.asdict(progress))
+        _send("progress", dataclasses.asdict(progress))
 
     def message(self, text: str) -> None:
         """Send a line of text."""
-        _tell("say", text)
+        _send("say", text)
 
     def summary(self, summary: Summary) -> None:
         """Send the summary of the process's part."""
-        _tell("summary", dataclasses.asdict(summary))
+        _send("summary", dataclasses.asdict(summary))
 
 
 def send_report(report: Mapping[str, Any]) -> None:
     """Send this process's part of the report, by which it announces a clean end."""
-    _tell("report", report)
+    _send("report", report)
 
 
-def heard(line: str) -> ProcessMessage:
+def parse_message(line: str) -> ProcessMessage:
     """Return the message in a line of a process; a line that is not a message is text."""
     try:
         data = json.loads(line)
@@ -72,7 +72,7 @@ def heard(line: str) -> ProcessMessage:
     return TextLine(printable(line))
 
 
-def _tell(key: str, value: object) -> None:
+def _send(key: str, value: object) -> None:
     sys.stdout.write(json.dumps({key: value}, allow_nan=False) + "\n")
     sys.stdout.flush()
 
@@ -105,7 +105,7 @@ def merged_report(
     return {
         **first,
         "stopped": min(stops, key=lambda stop: stop["time_s"]) if stops else None,
-        "tasks": {task: told for part in there for task, told in part["tasks"].items()},
+        "tasks": {task: report for part in there for task, report in part["tasks"].items()},
         "displays": {module: shown for part in there for module, shown in part.get("displays", {}).items()},
         "operations": _operations(item for part in there for item in part["operations"]),
         "processes": {
@@ -123,9 +123,9 @@ def _differing(first: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
     return [name for name, value in first["commons"].items() if other["commons"].get(name) != value]
 
 
-def _operations(told: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def _operations(reported: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     found: dict[tuple[Any, ...], Mapping[str, Any]] = {}
-    for item in told:
+    for item in reported:
         key = item["at"], item["what"], item.get("of")
         if key not in found or not item["ok"]:
             found[key] = item

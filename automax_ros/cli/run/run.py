@@ -85,7 +85,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
                 display.message(text)
             display.printed()
             display.update(rack.now_ns)
-            recording.tell()
+            recording.report_failure()
     finally:
         if recorder is not None:
             stream.end()
@@ -93,7 +93,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     state.end()
     for text in state.news():
         display.message(text)
-    recording.tell()
+    recording.report_failure()
     display.finish(plan.record, complete=not recording.failed)
     failed = recording.failed or state.failed or stimulation.refused > 0
     return conclude(rack, plan, report_at_end(rack, stimulation), failed=failed)
@@ -142,13 +142,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--ros",
         action="store_true",
         dest="with_ros",
-        help="with --simulated: with ROS nodes all the same, which send /clock and may be written",
+        help="with --simulated: with ROS nodes nevertheless, which publish /clock and may be written",
     )
     parser.add_argument(
-        "--rate", metavar="R", help="with --simulated --ros: R times as fast as the wall clock (default: as it goes)"
+        "--rate",
+        metavar="R",
+        help="with --simulated --ros: R times as fast as the wall clock (default: as fast as possible)",
     )
     parser.add_argument(
-        "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends by itself"
+        "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends"
     )
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
     add_set_argument(parser, tunables=True)
@@ -165,7 +167,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--stimuli",
         type=Path,
         metavar="FILE",
-        help="let happen what this YAML file says, by rack time (docs/stimuli.md)",
+        help="play this stimuli file, by rack time (docs/stimuli.md)",
     )
     parser.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write how the run ended: tasks, commons, forces, operations"
@@ -289,7 +291,7 @@ def _check_time(arguments: argparse.Namespace) -> None:
     if arguments.with_ros and not arguments.simulated:
         raise UsageError("--ros belongs to --simulated", "on the wall clock the rack has ROS nodes anyway")
     if arguments.rate is not None and not arguments.with_ros:
-        raise UsageError("--rate belongs to --simulated --ros", "without ROS time passes as fast as it goes")
+        raise UsageError("--rate belongs to --simulated --ros", "without ROS time passes as fast as possible")
     if arguments.simulated and not arguments.with_ros and arguments.ros is not None and arguments.ros.given:
         raise UsageError("--ros-args: with --simulated nothing of ROS is started", "add --ros, or leave them out")
 

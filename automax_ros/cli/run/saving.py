@@ -29,7 +29,7 @@ class RecordingMonitor:
     def __init__(self, recorder: Recorder | None, display: StatusDisplay) -> None:
         self._recorder = recorder
         self._display = display
-        self._told = False
+        self._is_reported = False
 
     @property
     def failed(self) -> bool:
@@ -41,11 +41,11 @@ class RecordingMonitor:
         if self._recorder is not None:
             self._recorder.flush(now_ns)
 
-    def tell(self) -> None:
+    def report_failure(self) -> None:
         """Report once, on the display and on standard error, that the recording has failed."""
-        if self.failed and not self._told:
+        if self.failed and not self._is_reported:
             assert self._recorder is not None
-            self._told = True
+            self._is_reported = True
             self._display.message("recording ended, the rack goes on")
             print(self._recorder.failure, file=sys.stderr, flush=True)
 
@@ -83,7 +83,7 @@ class SavedState:
         self._news: list[str] = []
         self._next_ns = SAVE_PERIOD_NS
         self._failure: RetentionFault | None = None
-        self._told = False
+        self._is_reported = False
         self._saving: threading.Thread | None = None
         self._last: Document | None = None
         if self._retention is not None:
@@ -98,8 +98,8 @@ class SavedState:
 
     def news(self) -> list[str]:
         """Return the lines to show since the last call."""
-        if self._failure is not None and not self._told:
-            self._told = True
+        if self._failure is not None and not self._is_reported:
+            self._is_reported = True
             self._news.append(f"values of this run will not outlive it: {self._failure.place}: {self._failure.message}")
         news, self._news = self._news, []
         return news
@@ -137,5 +137,5 @@ class SavedState:
 def _news(restored: Restored, path: Path) -> list[str]:
     counts = [count_of(restored.commons, "common"), count_of(restored.tunables, "tunable")]
     counts += [count_of(restored.forces, "force")] if restored.forces else []
-    told = any((restored.commons, restored.tunables, restored.forces))
-    return [*([f"kept from the last run: {', '.join(counts)} ({path})"] if told else []), *restored.notes]
+    any_kept = any((restored.commons, restored.tunables, restored.forces))
+    return [*([f"kept from the last run: {', '.join(counts)} ({path})"] if any_kept else []), *restored.notes]

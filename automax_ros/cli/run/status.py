@@ -139,7 +139,7 @@ class StatusDisplay:
 
     def update(self, now_ns: int) -> None:
         """Show news, and the progress at a rack time if it is due."""
-        self._tell_news()
+        self._show_news()
         passed = self._screen.due()
         if passed:
             self._screen.progress(self._progress(now_ns, passed))
@@ -152,7 +152,7 @@ class StatusDisplay:
 
     def finish(self, bag: Path | None, *, complete: bool = True) -> None:
         """Show the last news and the summary; ``complete`` says whether all of the run is in the recording."""
-        self._tell_news()
+        self._show_news()
         took = None if self._live else (time.monotonic_ns() - self._screen.began_ns) / NS_PER_S
         rack = self._rack
         self._screen.summary(
@@ -179,7 +179,7 @@ class StatusDisplay:
             for entry in task.errors.entries:
                 yield f"  {task.name}: {entry.describe()}"
 
-    def _tell_news(self) -> None:
+    def _show_news(self) -> None:
         for text in self._health.news() if self._health else ():
             self.message(printable(text))
 
@@ -212,10 +212,12 @@ class StatusDisplay:
         return dict(self._health.counts) if self._health else errors
 
     def _values(self) -> tuple[str, ...]:
-        return tuple(f"{item.label}={_shown(item, self._rack.value(item.name, item.index))}" for item in self._watch)
+        return tuple(
+            f"{item.label}={_shown_value(item, self._rack.value(item.name, item.index))}" for item in self._watch
+        )
 
 
-def _shown(item: CommonElement, value: Value) -> str:
+def _shown_value(item: CommonElement, value: Value) -> str:
     """Return a value as the rack file declares it: scaled, with its unit; the unit `counts` is not shown."""
     variable = item.variable
     text = value_text(value)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from automax_ros.cli.run.child_process import Child
-from automax_ros.cli.run.process_messages import ProcessMessage, Reported, heard
+from automax_ros.cli.run.process_messages import ProcessMessage, Reported, parse_message
 from automax_ros.cli.run.status import Progress
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 
@@ -165,10 +165,10 @@ class Supervisor:
             pass
 
     def _message(self, place: _Supervised, line: str) -> None:
-        told = heard(line)
-        place.has_begun = place.has_begun or isinstance(told, Progress)
-        place.reported = place.reported or isinstance(told, Reported)
-        self._on_message(place.post.name, told)
+        message = parse_message(line)
+        place.has_begun = place.has_begun or isinstance(message, Progress)
+        place.reported = place.reported or isinstance(message, Reported)
+        self._on_message(place.post.name, message)
 
     def _over(self, place: _Supervised, child: Child) -> None:
         """Handle the end of a process: record its exit code, restart it, or end the run."""

@@ -29,13 +29,13 @@ def bash(found: Sequence[Command]) -> str:
     """Return the script for bash 4 or later; readline shows words without descriptions."""
     every = [inner for command in found for inner in command.all()]
     choices = [
-        f'        "{_path(command)} {name}") words={_quoted(option.values)} ;;'
+        f'        "{_path(command)} {name}") words={_quote(option.values)} ;;'
         for command in every
         for option in command.options
         if option.values
         for name in option.names
     ]
-    words = [f'        "{_path(command)}") words={_quoted(_words(command))} ;;' for command in every]
+    words = [f'        "{_path(command)}") words={_quote(_words(command))} ;;' for command in every]
     return f"""# bash completion of automax
 _automax() {{
     local current=${{COMP_WORDS[COMP_CWORD]}} path="" words="" i
@@ -48,7 +48,7 @@ _automax() {{
 {_lines(choices)}
     *)
         case "$path" in
-        "") words={_quoted([command.words[-1] for command in found])} ;;
+        "") words={_quote([command.words[-1] for command in found])} ;;
 {_lines(words)}
         esac
         ;;
@@ -91,7 +91,7 @@ def fish(found: Sequence[Command]) -> str:
         here = f"complete -c automax -n '__automax_at \"{_path(command)}\"'"
         lines += [f"{here} {_fish_word(inner)}" for inner in command.inner]
         lines += [f"{here} {_fish_option(option)}" for option in command.options]
-        lines += [f"{here} -f -a {_quoted(item.values)}" for item in command.positionals if item.values]
+        lines += [f"{here} -f -a {_quote(item.values)}" for item in command.positionals if item.values]
     paths = " ".join(f'"{_path(inner)}"' for item in found for inner in item.all())
     return f"""# fish completion of automax
 function __automax_at
@@ -143,7 +143,7 @@ def _fish_word(command: Command) -> str:
 
 def _fish_option(option: Option) -> str:
     names = [f"-l {name[2:]}" if name.startswith("--") else f"-s {name[1:]}" for name in option.names]
-    takes = [] if not option.takes_value else ["-x", "-a", _quoted(option.values)] if option.values else ["-r"]
+    takes = [] if not option.takes_value else ["-x", "-a", _quote(option.values)] if option.values else ["-r"]
     return " ".join([*names, *takes, "-d", _fish_text(option.text)])
 
 
@@ -153,7 +153,7 @@ def _fish_text(text: str) -> str:
     return f"'{plain}'"
 
 
-def _quoted(words: Sequence[str]) -> str:
+def _quote(words: Sequence[str]) -> str:
     return f'"{" ".join(words)}"'
 
 

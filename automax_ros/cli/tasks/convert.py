@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Convert all files, print the changes, and write the files if requested."""
     target = target_of(arguments)
     places = _places(arguments.files, arguments.output)
-    converted = [(path, _converted(path, target)) for path in arguments.files]
+    converted = [(path, _convert(path, target)) for path in arguments.files]
     wrong = 0
     for path, result in converted:
         print("\n".join(_difference(path, result)), end="\n" if result.before != result.after else "")
@@ -74,14 +74,14 @@ def _places(files: list[Path], folder: Path | None) -> dict[Path, Path]:
     for path in files:
         place = folder / path.name
         if place in places.values():
-            raise UsageError(f"two files are named {path.name}", "convert them into folders of their own")
+            raise UsageError(f"two files are named {path.name}", "convert them into separate folders")
         if place.exists() or place.is_symlink():
             raise UsageError(f"{place} exists already", "name another folder, or remove the file")
         places[path] = place
     return places
 
 
-def _converted(path: Path, target: Target) -> Converted:
+def _convert(path: Path, target: Target) -> Converted:
     require_task(path)
     try:
         data = read_bytes(path)

@@ -215,7 +215,7 @@ def _step(response: BlockResponse) -> str:
     for place, laplace in zip(places, ideal, strict=True):
         time = f"{place * step.period_s:.6g}"
         rows.append((time, str(step.output[place]), fixed(step.design[place], 1), fixed(laplace, 1)))
-    return _step_summary(response) + _aligned(rows)
+    return _step_summary(response) + _align(rows)
 
 
 def step_places(scans: int, rows: int) -> list[int]:
@@ -245,7 +245,7 @@ def _bode(response: BlockResponse) -> str:
                 f"  {point.mark}" if point.mark else "",
             )
         )
-    table = _aligned(rows, left=(5, 10))
+    table = _align(rows, left=(5, 10))
     head, _, body = table.partition("\n")
     places = [head.index("dB", 0)]
     while len(places) < 3:
@@ -291,7 +291,7 @@ def _angle(gain: complex, degrees: float) -> str:
     return _NOTHING if level is None or level < -200.0 else fixed(degrees, 1)
 
 
-def _aligned(rows: Sequence[tuple[str, ...]], left: Sequence[int] = ()) -> str:
+def _align(rows: Sequence[tuple[str, ...]], left: Sequence[int] = ()) -> str:
     right = set(range(len(rows[0]))).difference(left)
     return "".join(f"  {line}\n" for line in table(rows, right))
 

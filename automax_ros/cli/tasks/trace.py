@@ -159,11 +159,11 @@ class InputTable(CsvTable):
             variable.write(value)
         except ValueError:
             tuned = symbol.tuning is not None and is_number(text)
-            message = f"{variable.label} = {quoted(text, marks='')}, it must be {_wanted(symbol, tuned=tuned)}"
+            message = f"{variable.label} = {quoted(text, marks='')}, it must be {_accepted_values(symbol, tuned=tuned)}"
             raise self.fault("AMX6916" if tuned else "AMX6915", message, line=line) from None
 
 
-def _wanted(symbol: Symbol, *, tuned: bool) -> str:
+def _accepted_values(symbol: Symbol, *, tuned: bool) -> str:
     """Return in words which values a variable accepts: within its tuning limits if ``tuned``, else of its type."""
     if tuned and symbol.tuning is not None:
         return f"inside its tuning limits, {value_text(symbol.tuning.low)} to {value_text(symbol.tuning.high)}"
@@ -271,7 +271,7 @@ def run(arguments: argparse.Namespace) -> int:
     lone = StandaloneTask(result.program, native_forms(arguments, _expected_ns(arguments, result.program.period_ns)))
     if arguments.verbose:
         print_native([lone.native])
-    watched = _watched(lone, watch_list(arguments.watch))
+    watched = _find_watched(lone, watch_list(arguments.watch))
     read = {"FILE": arguments.file, "--input": arguments.input, "--stimuli": arguments.stimuli}
     require_different_files(
         {key: path for key, path in read.items() if path is not None},
@@ -358,7 +358,7 @@ class _Trace:
             self._errors.writerow([str(entry.scan), str(entry.line), entry.problem, PROBLEMS[entry.problem].title])
 
 
-def _watched(lone: StandaloneTask, names: list[str] | None) -> list[LoneVariable]:
+def _find_watched(lone: StandaloneTask, names: list[str] | None) -> list[LoneVariable]:
     if names is None:
         return lone.simple_variables()
     try:

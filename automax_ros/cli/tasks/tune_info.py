@@ -172,7 +172,7 @@ def run(arguments: argparse.Namespace) -> int:
     program = None
     if arguments.file is not None:
         if arguments.ticks is not None:
-            raise UsageError("--ticks and FILE both tell the scan time", "give one of them")
+            raise UsageError("--ticks and FILE both give the scan time", "give one of them")
         program = checked_program(arguments)
         if program is None:
             return 1
@@ -357,10 +357,10 @@ def _corners(tuning: Tuning) -> Rows:
             yield "corner", f"{' ' * width}  ! above the Nyquist frequency"
             continue
         gains = f"Laplace {gain_text(corner.laplace)}, discrete {gain_text(corner.discrete)}"
-        yield "corner", f"{' ' * width}  {gains}{_moved(corner)}"
+        yield "corner", f"{' ' * width}  {gains}{_mapped_text(corner)}"
 
 
-def _moved(corner: Corner) -> str:
+def _mapped_text(corner: Corner) -> str:
     if corner.warping is None or corner.mapped_rad_s is None or abs(corner.warping) < 5e-5:
         return ""
     return f"; mapped to {number_text(corner.mapped_rad_s, 5)} rad/s ({corner.warping * 100.0:+.2f} %)"

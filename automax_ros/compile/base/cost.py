@@ -52,7 +52,7 @@ class CostModel:
     def block_ns(self, bound: BoundCall) -> int:
         """Return the time of one block as programmed, without that of the elements that it searches."""
         time = self._time(bound.block.times)
-        return 0 if time is None else _to_ns(_sum(time, _programmed(bound)))
+        return 0 if time is None else _to_ns(_sum(time, _count_programmed(bound)))
 
     def element_ns(self, bound: BoundCall) -> int:
         """Return the time of each element that a block searches; a scan determines their number (m of the tables)."""
@@ -111,7 +111,7 @@ def _to_ns(microseconds: float) -> int:
     return round(microseconds * NS_PER_US)
 
 
-def _programmed(bound: BoundCall) -> dict[str, int]:
+def _count_programmed(bound: BoundCall) -> dict[str, int]:
     """Return the counts of programmed parameters, by the letters of the manual's tables.
 
     Only inputs of numbered channels count as ``j``: SELECT's are INPUTn and SELECTn, those of WRITE blocks are without

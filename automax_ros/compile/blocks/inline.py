@@ -37,7 +37,7 @@ def carry_on(
     """Replace ``own`` locals that are set once by their values, if literals or names that the body does not set."""
     results = dict(outputs)
     for _ in range(MOST_ROUNDS):
-        bindings = _carried(body, own)
+        bindings = _collect_carried(body, own)
         if not bindings:
             break
         fold = Fold(bindings, HELPERS)
@@ -46,7 +46,7 @@ def carry_on(
     return body, results
 
 
-def _carried(body: list[ast.stmt], own: frozenset[str]) -> dict[str, ast.expr]:
+def _collect_carried(body: list[ast.stmt], own: frozenset[str]) -> dict[str, ast.expr]:
     stores = _stores(body)
     bindings: dict[str, ast.expr] = {}
     for part in body:
@@ -239,7 +239,7 @@ def inline(block: Block, binding: Binding, wanted: Mapping[str, str], free: froz
         free: targets of ``wanted`` in which the block may compute directly: nothing reads them meanwhile.
     """
     if binding.tables:
-        return _inlined(block, binding, wanted, free)
+        return _inline(block, binding, wanted, free)
     stand_ins = _StandIns()
     shape = (
         block,
@@ -263,7 +263,7 @@ class _StandIns:
     def text(self, value: ast.expr) -> str:
         if isinstance(value, ast.Name):
             return self.of(value.id)
-        return ast.unparse(_renamed(value, self.of))
+        return ast.unparse(_rename(value, self.of))
 
     def replaced(self, inlined: Inlined, prefix: str) -> Inlined:
         """Return an inlined block with the names of the CALL in place of their placeholders."""
@@ -273,14 +273,14 @@ class _StandIns:
             return prefix + name.removeprefix(_PREFIX) if name.startswith(_PREFIX) else names.get(name, name)
 
         return Inlined(
-            [_renamed(statement, name_of) for statement in inlined.body],
-            {keyword: _renamed(value, name_of) for keyword, value in inlined.outputs.items()},
-            _renamed(inlined.writes, name_of),
-            None if inlined.error is None else _renamed(inlined.error, name_of),
+            [_rename(statement, name_of) for statement in inlined.body],
+            {keyword: _rename(value, name_of) for keyword, value in inlined.outputs.items()},
+            _rename(inlined.writes, name_of),
+            None if inlined.error is None else _rename(inlined.error, name_of),
         )
 
 
-def _renamed(node: _Node, name_of: Callable[[str], str]) -> _Node:
+def _rename(node: _Node, name_of: Callable[[str], str]) -> _Node:
     """Return a copy of a tree with its names replaced; nodes without names are shared."""
     if isinstance(node, ast.Name):
         return cast(_Node, _shared_name(name_of(node.id), isinstance(node.ctx, ast.Store)))
@@ -298,16 +298,16 @@ def _shared_name(identifier: str, stored: bool) -> ast.Name:
 def _renamed_part(part: object, name_of: Callable[[str], str]) -> object:
     if isinstance(part, list):
         return [_renamed_part(item, name_of) for item in part]
-    return _renamed(part, name_of) if isinstance(part, ast.AST) else part
+    return _rename(part, name_of) if isinstance(part, ast.AST) else part
 
 
 @functools.lru_cache(maxsize=512)
 def _inlined_shape(block: Block, values: _Pairs, states: _Pairs, wanted: _Pairs, free: frozenset[str]) -> Inlined:
     expressions = {name: ast.parse(text, mode="eval").body for name, text in values}
-    return _inlined(block, Binding(_PREFIX, expressions, dict(states), {}), dict(wanted), free)
+    return _inline(block, Binding(_PREFIX, expressions, dict(states), {}), dict(wanted), free)
 
 
-def _inlined(block: Block, binding: Binding, wanted: Mapping[str, str], free: frozenset[str]) -> Inlined:
+def _inline(block: Block, binding: Binding, wanted: Mapping[str, str], free: frozenset[str]) -> Inlined:
     tree = step_tree(block)
     prefix = binding.prefix
     results = dict(zip([output.variable for output in block.outputs], tree.results, strict=False))

@@ -158,10 +158,10 @@ class BlockInstance:
 def instance_of(bound: BoundCall, prefix: str, occurrence: int, period_ns: int) -> BlockInstance:
     """Return the instance of a CALL; ``occurrence`` counts the calls of one line from 0."""
     place = f"{bound.line}" if occurrence == 0 else f"{bound.line}.{occurrence + 1}"
-    return BlockInstance(bound, f"{place} {bound.block.name}", prefix, _evaluated(bound, period_ns))
+    return BlockInstance(bound, f"{place} {bound.block.name}", prefix, _evaluated_parameters(bound, period_ns))
 
 
-def _evaluated(bound: BoundCall, period_ns: int) -> tuple[str, ...]:
+def _evaluated_parameters(bound: BoundCall, period_ns: int) -> tuple[str, ...]:
     """Return the parameters to evaluate while the task runs: variables, and literals that have to be limited."""
     declared = bound.block.coefficients
     if declared is None:

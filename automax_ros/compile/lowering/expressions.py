@@ -138,10 +138,10 @@ def _lower_unary(emitter: Emitter, expression: Unary) -> Lowered:
         # the sign is part of the constant: -2147483648 is valid, 2147483648 is not
         return Lowered(build.constant(-literal.value), DataType.DOUBLE, -literal.value, -literal.value)
     operand = lower(emitter, expression.operand)
-    return _shallow(emitter, _signed(emitter, expression, operand), operand)
+    return _shallow(emitter, _lower_sign(emitter, expression, operand), operand)
 
 
-def _signed(emitter: Emitter, expression: Unary, operand: Lowered) -> Lowered:
+def _lower_sign(emitter: Emitter, expression: Unary, operand: Lowered) -> Lowered:
     if expression.operator == "NOT":
         if operand.type is DataType.BOOLEAN:
             return of_type(build.inverse(operand.node), DataType.BOOLEAN)

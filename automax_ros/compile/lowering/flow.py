@@ -150,7 +150,7 @@ class Flow:
         for place in self._to_end:
             place.value = len(self.blocks)
         turns: list[ast.stmt] = [build.when(build.compare(build.name(STEPS), ">", build.constant(limit)), too_many)]
-        turns += _dispatched([self._whole(number) for number in range(len(self.blocks))], 0)
+        turns += _dispatch([self._whole(number) for number in range(len(self.blocks))], 0)
         end = build.constant(len(self.blocks))
         return build.loop(build.compare(build.name(PC), "<>", end), turns)
 
@@ -159,7 +159,7 @@ class Flow:
         return [*counted, *_turning(self.blocks[number], number)]
 
 
-def _dispatched(blocks: list[list[ast.stmt]], first: int) -> list[ast.stmt]:
+def _dispatch(blocks: list[list[ast.stmt]], first: int) -> list[ast.stmt]:
     """Return the tests that lead to blocks, the first of which has the number ``first``."""
     pc = build.name(PC)
     if len(blocks) <= GROUP:
@@ -173,7 +173,7 @@ def _dispatched(blocks: list[list[ast.stmt]], first: int) -> list[ast.stmt]:
     return [
         build.when(
             build.compare(pc, "<", build.constant(first + start + size)),
-            _dispatched(blocks[start : start + size], first + start),
+            _dispatch(blocks[start : start + size], first + start),
         )
         for start in range(0, len(blocks), size)
     ]
@@ -227,8 +227,8 @@ def begin_loop(emitter: Emitter, statement: For, place: str) -> Loop:
     step = Lowered(build.constant(1), DataType.DOUBLE, 1, 1)
     if statement.step is not None:
         step = lower(emitter, statement.step)
-    stop_node = _kept(emitter, f"{prefix}_stop", stop.node)
-    step_node = _kept(emitter, f"{prefix}_step", step.node)
+    stop_node = _keep(emitter, f"{prefix}_stop", stop.node)
+    step_node = _keep(emitter, f"{prefix}_step", step.node)
     store(emitter, statement.variable, start)
     bounds = (stop.low, stop.high), (step.low, step.high)
     loop = Loop(statement, place, stop_node, step_node, stop.type, step.type, *bounds)
@@ -238,7 +238,7 @@ def begin_loop(emitter: Emitter, statement: For, place: str) -> Loop:
     return loop
 
 
-def _kept(emitter: Emitter, name: str, node: ast.expr) -> ast.expr:
+def _keep(emitter: Emitter, name: str, node: ast.expr) -> ast.expr:
     if value_of(node) is not None:
         return node
     emitter.emit(build.assign(name, node))

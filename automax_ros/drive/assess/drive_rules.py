@@ -61,7 +61,7 @@ def tach_loss(case: DriveCase) -> Finding:
     return Finding(
         "tach loss threshold",
         _threshold_verdict(used, bound, jbar),
-        f"register 4136: {case.threshold.text}; at most {_bound_text(exact)}" + _raised(used, jbar),
+        f"register 4136: {case.threshold.text}; at most {_bound_text(exact)}" + _raise_hint(used, jbar),
         formula,
         numbers,
         {"delta_bound_deg": exact, "register_4136": used},
@@ -84,7 +84,7 @@ def _threshold_verdict(used: float | None, bound: float, jbar: float | None) -> 
     return Verdict.FINE
 
 
-def _raised(used: float | None, jbar: float | None) -> str:
+def _raise_hint(used: float | None, jbar: float | None) -> str:
     if used is None or used <= DEFAULT_THRESHOLD_DEG or (jbar is not None and jbar >= LEAST_JBAR_S):
         return ""
     return f"; it may be above {DEFAULT_THRESHOLD_DEG} only with a JBAR of {LEAST_JBAR_S:g} s or more"

@@ -275,7 +275,7 @@ class Circuit(Conduction):
             "events": [(kind.value, *rest) for kind, *rest in self._events],
             "conducting": self._net.mask,
             # The order in which currents are checked determines the last bits of an instant that several share.
-            "guards": [[net.mask, [guard[0] for guard in net.guards]] for net in self._built()],
+            "guards": [[net.mask, [guard[0] for guard in net.guards]] for net in self._build_networks()],
         }
 
     def restore(self, state: SavedState) -> None:
@@ -303,7 +303,7 @@ class Circuit(Conduction):
             self._network(mask).put_in_order(order)
         self._net = self._network(state["conducting"])
 
-    def _built(self) -> list[Network]:
+    def _build_networks(self) -> list[Network]:
         found = {net.mask: net for net in [*self._nets.values(), self._net]}
         return [found[mask] for mask in sorted(found)]
 

@@ -197,18 +197,18 @@ class Network:
                 share = 0.0
                 if self.active and not self.armature_short:
                     share = (1.0 if rail == P else -1.0) / len(group)
-                rails[rail] = _combined((cosine, sine, -offset, 0.0, 0.0, 0.0), impeded, -share)
+                rails[rail] = _combine((cosine, sine, -offset, 0.0, 0.0, 0.0), impeded, -share)
         self.floating_offset: Potential | None = _EMF if wiring.armature_closed else None
         if self.armature_short:
-            self.floating_offset = _combined(_NOTHING, _UNIT, self.rail_offset)
+            self.floating_offset = _combine(_NOTHING, _UNIT, self.rail_offset)
             tied = rails[P]
-            rails[M] = None if tied is None else _combined(tied, _UNIT, -self.rail_offset)
+            rails[M] = None if tied is None else _combine(tied, _UNIT, -self.rail_offset)
         elif wiring.armature_closed:
             at_p, at_m = rails
             if at_p is None and at_m is not None:
-                rails[P] = _combined(at_m, _EMF, 1.0)
+                rails[P] = _combine(at_m, _EMF, 1.0)
             elif at_m is None and at_p is not None:
-                rails[M] = _combined(at_p, _EMF, -1.0)
+                rails[M] = _combine(at_p, _EMF, -1.0)
         phases: list[Potential | None] = []
         for x in range(3):
             cosine, sine = line.unit_wave(x)
@@ -218,7 +218,7 @@ class Network:
             for rail in (P, M):
                 tied = rails[rail]
                 if 2 * x + rail in legs and tied is not None:
-                    potential = _combined(tied, _UNIT, drops[2 * x + rail])
+                    potential = _combine(tied, _UNIT, drops[2 * x + rail])
             phases.append(potential)
         self.potentials = [*phases, *rails]
 
@@ -302,7 +302,7 @@ _UNIT: Potential = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _EMF: Potential = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def _combined(one: Potential, two: Potential, factor: float) -> Potential:
+def _combine(one: Potential, two: Potential, factor: float) -> Potential:
     a, b = one, two
     return (
         a[0] + factor * b[0],
@@ -331,7 +331,7 @@ def _watch(nodes: list[Potential | None], floating: Potential | None, wanted: in
     for mask, start, end in ways:
         one, two = nodes[start], nodes[end]
         if one is not None and two is not None:
-            found.append((mask, _combined(one, two, -1.0)))
+            found.append((mask, _combine(one, two, -1.0)))
     for first, start, entry in ways:
         for second, leave, end in ways:
             if first != second and nodes[entry] is None and nodes[leave] is None:
@@ -349,11 +349,11 @@ def _series(
     if start == end and entry != leave:
         way: Potential = _NOTHING
     elif start != end and one is not None and two is not None:
-        way = _combined(one, two, -1.0)
+        way = _combine(one, two, -1.0)
     else:
         return None
     if entry == leave:
         return way
     if floating is None or entry < 3 or leave < 3:
         return None
-    return _combined(way, floating, -1.0 if entry == 3 else 1.0)
+    return _combine(way, floating, -1.0 if entry == 3 else 1.0)

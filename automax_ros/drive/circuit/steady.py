@@ -116,7 +116,7 @@ def steady_state(case: BridgeCase) -> SteadyState:
         if circuit is not None:
             pieces = circuit.pieces()
             return _describe(case, [(circuit.sample(), pieces)], current)
-    return _simulated(case)
+    return _simulate(case)
 
 
 def _window(case: BridgeCase, current_a: float) -> Circuit | None:
@@ -155,7 +155,7 @@ def _fixed_point(case: BridgeCase) -> float | None:
     return None
 
 
-def _simulated(case: BridgeCase) -> SteadyState:
+def _simulate(case: BridgeCase) -> SteadyState:
     """Return the state in which a simulation from rest settles: for overlaps beyond 60 degrees, or to find none."""
     circuit = case.circuit()
     bridge = ConstantAlpha(circuit, radians(case.alpha_deg), bridge=2 if case.reverse else 1)

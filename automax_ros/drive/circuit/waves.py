@@ -72,7 +72,7 @@ def first_zero(
                 bend -= decay_b * part
         if value < 0.0:
             if t > 0.0:
-                return _between(c, d, k, a, b, theta, omega, decay, decay_b, before, above, t, value)
+                return _find_zero(c, d, k, a, b, theta, omega, decay, decay_b, before, above, t, value)
             if value < -ZERO_A:
                 return 0.0
             value = 0.0
@@ -104,7 +104,7 @@ def first_zero(
             t = limit
 
 
-def _between(
+def _find_zero(
     c: float,
     d: float,
     k: float,

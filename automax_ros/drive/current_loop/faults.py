@@ -117,10 +117,10 @@ class Faults(Stateful):
         if not new:
             return []
         self.active |= new
-        told = [kind.problem for kind in KINDS if kind.bit & new]
+        problems = [kind.problem for kind in KINDS if kind.bit & new]
         if causes & HARDWARE and new & OSV:
-            told[told.index(OSV_PROBLEM)] = OVERSPEED_TRIP
-        return told
+            problems[problems.index(OSV_PROBLEM)] = OVERSPEED_TRIP
+        return problems
 
     def blame(self, pair: int) -> list[int]:
         """Latch a shorted SCR of a pair, 1 to 6; return the problems to log."""

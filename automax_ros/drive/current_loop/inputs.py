@@ -42,7 +42,7 @@ _LIMITED: Final = (
 _SWITCHES: Final = ("digital_tach", "tach_loss_stop", "auto_phrot")
 _DYNAMIC: Final = ("cc_thresh", "ref_rate", "kp", "test_alpha")
 _SEEN: Final = 1 << len(_DYNAMIC)
-_TOLD: Final = _SEEN << 1
+_LOGGED: Final = _SEEN << 1
 """Bits after those of the dynamic inputs: registers of another ratio were read at the last tick; they were logged."""
 _INPUTS: Final = _SEEN - 1
 
@@ -188,11 +188,11 @@ class Latched(Stateful):
         It is logged once from task initialisation on, if two ticks in a row show it: a task that changes them writes
         one after the other. They are used as they are (decision).
         """
-        if phase_step == 2 * period_step or min(phase_step, period_step) <= 0 or self._bad & _TOLD:
+        if phase_step == 2 * period_step or min(phase_step, period_step) <= 0 or self._bad & _LOGGED:
             self._bad &= ~_SEEN
             return []
         if self._bad & _SEEN:
-            self._bad ^= _SEEN | _TOLD
+            self._bad ^= _SEEN | _LOGGED
             return [BAD_RATIO]
         self._bad |= _SEEN
         return []

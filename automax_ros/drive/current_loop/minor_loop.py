@@ -127,8 +127,8 @@ class CurrentMinorLoop(Stateful):
         # Named tuples are created by tuple's constructor: their own takes twice the time.
         values = pll.next_ns, sequence.relays, pulses, self.latched.ioc_thresh, block, ok
         row = self._row(measured) if ticked else None
-        told = tuple(problems) if problems else ()
-        return _new(Outcome, (_new(Command, values), row, self._record(pulses), told, first))
+        logged = tuple(problems) if problems else ()
+        return _new(Outcome, (_new(Command, values), row, self._record(pulses), logged, first))
 
     def _read(self, measured: Measured, inputs: Inputs) -> list[int]:
         problems = self.latched.always(inputs) + self.latched.ratio(measured.phase_step, measured.period_step)

@@ -77,7 +77,7 @@ class DriveController:
         status |= self.late_us << LATE_BIT
         if self.watch() or self.overspeed.sees:
             status |= OVERSPEED
-            self.overspeed.told()
+            self.overspeed.note_reported()
         sync = plant.sync
         if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.rated_v and sync.is_there:
             status |= LINE

@@ -193,12 +193,12 @@ def _line_notches(plant: DrivePlant, values: Numbers) -> None:
     width = width_us * 1e-6 * plant.data.parameters.line_hz
     plant.sync.set_notches(percent / 100.0, width, int(count), radians(phase_deg))
     _supply(plant)
-    _disturbed(plant, NOTCHES, values)
+    _note_disturbance(plant, NOTCHES, values)
 
 
 def _line_noise(plant: DrivePlant, values: Numbers) -> None:
     plant.sync.set_noise(values[0] / 100.0, int(values[1]))
-    _disturbed(plant, NOISE, values)
+    _note_disturbance(plant, NOISE, values)
 
 
 def _line_harmonic(plant: DrivePlant, values: Numbers) -> None:
@@ -209,7 +209,7 @@ def _line_harmonic(plant: DrivePlant, values: Numbers) -> None:
         note(plant, f"{HARMONIC} {order:g} {percent:g} {phase_deg:g}")
 
 
-def _disturbed(plant: DrivePlant, verb: str, values: Numbers) -> None:
+def _note_disturbance(plant: DrivePlant, verb: str, values: Numbers) -> None:
     forget(plant, verb)
     if values[0]:
         note(plant, " ".join([verb, *(f"{value:g}" for value in values)]))

@@ -21,7 +21,7 @@ sound trips first)."""
 FULL: Final = 4095
 """Counts of full speed (52.1.5, SPEED_FDBK)."""
 NEVER: Final = -1
-SOUND, TRIPPED, TOLD = 0, 1, 2
+SOUND, TRIPPED, REPORTED = 0, 1, 2
 """The circuit has not tripped; it has tripped; it has tripped and reported this to the loop."""
 
 
@@ -78,14 +78,14 @@ class OverspeedCircuit:
         self._trip = TRIPPED
         return True
 
-    def told(self) -> None:
+    def note_reported(self) -> None:
         """Record that the trip was reported to the loop."""
         if self._trip == TRIPPED:
-            self._trip = TOLD
+            self._trip = REPORTED
 
     def holds(self, *, ok: bool) -> bool:
         """Return whether a trip holds gates and contactor off against a command; ``ok``: the loop has no fault."""
-        if self._trip == TOLD and ok and not self.sees:
+        if self._trip == REPORTED and ok and not self.sees:
             self._trip = SOUND
         return self._trip != SOUND
 

@@ -63,7 +63,7 @@ class PlantMeter:
         if circuit.energy is None:
             circuit.energy = EnergyMeter()
         self._sums = (0.0, 0.0, 0.0, 0.0)
-        self._told = _sums(circuit.present_sample())
+        self._last = _sums(circuit.present_sample())
 
     def add(self, sample: Sample) -> None:
         """Add a sample that was fetched from the circuit."""
@@ -75,9 +75,9 @@ class PlantMeter:
         """Return the means since the last reading."""
         present = _sums(self._circuit.present_sample())
         duration, charge, square, volt_s = (
-            sums + now - told for sums, now, told in zip(self._sums, present, self._told, strict=True)
+            sums + now - last for sums, now, last in zip(self._sums, present, self._last, strict=True)
         )
-        self._sums, self._told = (0.0, 0.0, 0.0, 0.0), present
+        self._sums, self._last = (0.0, 0.0, 0.0, 0.0), present
         if duration <= 0.0:
             return Means()
         return Means(duration, charge / duration, sqrt(max(square, 0.0) / duration), volt_s / duration)

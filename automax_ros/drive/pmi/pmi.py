@@ -170,11 +170,11 @@ class Pmi(Stateful):
             table.STATUS: self._status(),
             table.FAULTS: sign_extended(self.faults, 16),
             table.WARNINGS: self.warnings,
-            table.SPEED: _limited(tach_rpm(plant) / self._base_rpm * table.FULL),
+            table.SPEED: _limit(tach_rpm(plant) / self._base_rpm * table.FULL),
             table.POSITION: self.position,
-            table.VOLTAGE: _limited(volts / self._rated_v * table.RATED_VOLTAGE),
-            table.CURRENT: _limited(self.current * (table.FULL * 100 / RATED) / self.ratio),
-            table.VOLTS: _limited(volts),
+            table.VOLTAGE: _limit(volts / self._rated_v * table.RATED_VOLTAGE),
+            table.CURRENT: _limit(self.current * (table.FULL * 100 / RATED) / self.ratio),
+            table.VOLTS: _limit(volts),
             table.DELTA: round(loop.control.delta_us) if running else 0,
             table.DC_TIME: loop.control.dc_time,
             table.LINE_PERIOD: loop.pll.period_us,
@@ -236,5 +236,5 @@ def inputs_of(plant: DrivePlant, ratio: int) -> Inputs:
     )
 
 
-def _limited(number: float) -> int:
+def _limit(number: float) -> int:
     return round(max(-_WORD, min(_WORD, number)))

@@ -107,7 +107,7 @@ def check(
     try:
         layout = _check_module(context, module)
     except TooManyProblemsError:
-        message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not looked at"
+        message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not checked"
         context.diagnostics.append(Diagnostic(_TOO_MANY, message, context.diagnostics[-1].span, context.line))
     diagnostics = in_order(context.diagnostics)
     unconfirmed = find_unconfirmed(module, context.kind)
@@ -178,8 +178,8 @@ def _program(context: Context, layout: TaskLayout, name: str, source: SourceText
     return Program(
         name=name,
         symbols=context.symbols,
-        startup=_executed(layout.startup),
-        scan=_executed(layout.scan),
+        startup=_executable_statements(layout.startup),
+        scan=_executable_statements(layout.scan),
         ticks=context.ticks or 0,
         tick_ns=context.tick_ns,
         calls=context.calls,
@@ -202,7 +202,7 @@ def _line_call(context: Context, layout: TaskLayout) -> BoundCall | None:
     return bound if bound is not None and bound.block.line_scan is not None else None
 
 
-def _executed(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+def _executable_statements(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
     return tuple(statement for statement in statements if not isinstance(statement, Declaration))
 
 

@@ -19,13 +19,13 @@ EVENT_KEYS = ("INTERRUPT_STATUS", "TIMEOUT")
 def declaration(cursor: Cursor, start: Token) -> Declaration:
     """Read the list after LOCAL, COMMON or GLOBAL."""
     scope = Scope.LOCAL if start.text == "LOCAL" else Scope.COMMON
-    variables = cursor.separated(lambda: _declared(cursor, start.text))
+    variables = cursor.separated(lambda: _parse_declared(cursor, start.text))
     if cursor.current.is_name and not cursor.at("REM", "ELSE"):
         cursor.fail("AMX0071", f"a comma is missing before {cursor.found()}")
     return Declaration(scope, variables)
 
 
-def _declared(cursor: Cursor, word: str) -> Declared:
+def _parse_declared(cursor: Cursor, word: str) -> Declared:
     token = cursor.current
     if not token.is_name:
         cursor.fail("AMX0075", f"{word} needs the name of a variable, not {cursor.found()}")

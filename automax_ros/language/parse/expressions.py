@@ -82,7 +82,7 @@ def _operation(cursor: Cursor, level: int, depth: int) -> _Measured:
     if cursor.at("NOT"):
         left, height = _negation(cursor, level, depth)
     else:
-        left, height = _signed(cursor, depth)
+        left, height = _parse_signed(cursor, depth)
     while True:
         operator = cursor.current.text
         operator_level = LEVELS.get(operator, 0)
@@ -107,7 +107,7 @@ def _negation(cursor: Cursor, level: int, depth: int) -> _Measured:
     return tree.Unary("NOT", operand, span=start.span.to(operand.span)), height + 1
 
 
-def _signed(cursor: Cursor, depth: int) -> _Measured:
+def _parse_signed(cursor: Cursor, depth: int) -> _Measured:
     if not cursor.at("-", "+"):
         return _primary(cursor, depth, False)
     sign = cursor.advance()
@@ -123,7 +123,7 @@ def _primary(cursor: Cursor, depth: int, negative: bool) -> _Measured:
     if token.kind in (Kind.INTEGER, Kind.REAL, Kind.STRING) or token.text in BOOLEAN_WORDS:
         return _literal(cursor, negative)
     if token.is_name and token.text not in RESERVED_WORDS:
-        return _named(cursor, depth)
+        return _parse_named(cursor, depth)
     if token.text == "(":
         cursor.advance()
         inner = _operation(cursor, 1, depth + 1)
@@ -158,7 +158,7 @@ def _literal(cursor: Cursor, negative: bool) -> _Measured:
     return tree.BooleanLiteral(BOOLEAN_WORDS[token.text], span=span), 1
 
 
-def _named(cursor: Cursor, depth: int) -> _Measured:
+def _parse_named(cursor: Cursor, depth: int) -> _Measured:
     token = cursor.current
     name = token.text
     if name in REFUSED_FUNCTIONS:

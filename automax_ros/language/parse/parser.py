@@ -60,7 +60,7 @@ class StatementReader:
         following = cursor.following
         assigns = following.kind is Kind.OPERATOR
         cursor.skip_statement()
-        if word == "FOR" or (word and not assigns and _meant(word, "FOR")):
+        if word == "FOR" or (word and not assigns and _is_meant(word, "FOR")):
             self._frames.open_wrong("FOR", first.span, doubtful=word != "FOR")
         elif word in ("ENDIF", "ENDFI") or (word == "END" and following.text == "IF"):
             self._frames.close_quietly("END_IF", first.span)
@@ -71,7 +71,7 @@ class StatementReader:
             self._frames.close_quietly("NEXT", first.span)
         elif word and not assigns:
             for end in ("ELSE", "END_IF", "NEXT"):
-                if _meant(word, end):
+                if _is_meant(word, end):
                     self._frames.close_quietly(end, first.span)
 
     def _recover_if(self, cursor: Cursor, first: Token, failed: int) -> None:
@@ -187,7 +187,7 @@ class StatementReader:
     def _refuse_behind_then(self, cursor: Cursor) -> None:
         word = cursor.current.text
         if word in _BLOCK_WORDS and cursor.following.text != "=":
-            hint = "put nothing after THEN and the statements on lines of their own, closed by END_IF"
+            hint = "put nothing after THEN and the statements on separate lines, closed by END_IF"
             cursor.fail("AMX0060", f"{word} cannot stand after THEN on one line", hint)
         refuse_word(cursor, self._kind)
 
@@ -264,7 +264,7 @@ def _check_glued_remark(cursor: Cursor) -> None:
         cursor.fail("AMX0035", f"`=` is missing: `{text}` is read as a DOUBLE INTEGER variable", hint)
 
 
-def _meant(word: str, meant: str) -> bool:
+def _is_meant(word: str, meant: str) -> bool:
     hint = did_you_mean(word, STATEMENT_WORDS)
     return word not in STATEMENT_WORDS and hint == f"did you mean {meant}?"
 

@@ -6,7 +6,7 @@ from automax_ros.core.diagnostics import Diagnostic, Note, Span
 from automax_ros.language.text.tokens import SourceFault, Token
 
 DIAGNOSTIC_LIMIT = 200
-"""Most problems reported of one source; one more says that there are others (decision: nobody reads more)."""
+"""Most problems reported of one source; one more says that there are others (decision: more are not read)."""
 
 
 class TooManyProblemsError(Exception):
@@ -33,7 +33,7 @@ class Reporter:
     def report(self, fault: SourceFault, span: Span, notes: tuple[Note, ...] = ()) -> None:
         """Add a problem; raises TooManyProblemsError at the limit."""
         if len(self.diagnostics) >= DIAGNOSTIC_LIMIT:
-            message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not looked at"
+            message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not checked"
             self.diagnostics.append(Diagnostic("AMX0002", message, span, self.statement))
             raise TooManyProblemsError
         self.diagnostics.append(Diagnostic(fault.code, fault.message, span, self.statement, fault.hint, notes))

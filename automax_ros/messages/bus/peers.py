@@ -46,7 +46,7 @@ class Peer:
     """
 
     presence: Presence
-    heard_ns: int
+    received_ns: int
     received: int = 0
     short_since_ns: int | None = None
     gap: bool = False
@@ -94,9 +94,9 @@ class Peers:
     lives: Callable[[Presence], bool | None] = lambda _: None
     _looked_ns: int = 0
 
-    def heard(self, presence: Presence, now_ns: int) -> PresenceVerdict:
+    def receive(self, presence: Presence, now_ns: int) -> PresenceVerdict:
         """Process a presence."""
-        refused = self._refused(presence)
+        refused = self._refusal(presence)
         if refused is not None:
             return refused
         if presence.run_id and not self.run_id:
@@ -105,7 +105,7 @@ class Peers:
             self.epoch_ns = presence.epoch_ns
         peer = self.by_slot.get(presence.seat)
         if peer is not None and peer.process == presence.process:
-            peer.presence, peer.heard_ns = presence, now_ns
+            peer.presence, peer.received_ns = presence, now_ns
             return PresenceVerdict.KNOWN
         # Batches from before its first presence were not received: the first one that it announces is missing.
         self.by_slot[presence.seat] = Peer(presence, now_ns)
@@ -128,7 +128,7 @@ class Peers:
         peer = self.by_slot.get(presence.seat)
         return peer if peer is not None and peer.presence is presence and presence.sequence > peer.received else None
 
-    def _refused(self, presence: Presence) -> PresenceVerdict | None:
+    def _refusal(self, presence: Presence) -> PresenceVerdict | None:
         if presence.process == self.process:
             return PresenceVerdict.OWN
         if presence.run_id and self.run_id and presence.run_id != self.run_id:
@@ -154,7 +154,7 @@ class Peers:
         lives = self.lives(peer.presence)
         if lives is False:
             return True
-        return not held_up and now_ns - peer.heard_ns > (HUNG_NS if lives else SILENCE_NS)
+        return not held_up and now_ns - peer.received_ns > (HUNG_NS if lives else SILENCE_NS)
 
     def of(self, process: int) -> Peer | None:
         """Return the process with a number; None if it is not of this run."""

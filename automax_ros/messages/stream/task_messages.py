@@ -58,20 +58,20 @@ _NO_ENTRIES: _Columns = ((), (), ())
 
 def as_i16(number: int) -> int:
     """Return the int16 with the bits of a uint16."""
-    return number if 0 <= number < 1 << 15 else _wrapped(number, 16)
+    return number if 0 <= number < 1 << 15 else _wrap(number, 16)
 
 
 def as_i32(number: int) -> int:
     """Return the int32 with the bits of a uint32."""
-    return number if 0 <= number < 1 << 31 else _wrapped(number, 32)
+    return number if 0 <= number < 1 << 31 else _wrap(number, 32)
 
 
 def as_i64(number: int) -> int:
     """Return the int64 with the bits of a uint64."""
-    return number if 0 <= number <= _PLAIN else _wrapped(number, 64)
+    return number if 0 <= number <= _PLAIN else _wrap(number, 64)
 
 
-def _wrapped(number: int, bits: int) -> int:
+def _wrap(number: int, bits: int) -> int:
     if not 0 <= number < 1 << bits:
         raise OverflowError(f"{number} does not fit an unsigned number of {bits} bits")
     return number - (1 << bits) if number >> (bits - 1) else number
@@ -103,7 +103,7 @@ class TaskMessages:
             changed = as_values(views, (0,) * len(views), latched) if latched else NO_VALUES
             return self._scan(record, stamp, changed, full=True)
         differs = () if latched == before else tuple(map(ne, latched, before))
-        return self._scan(record, stamp, _changed(self._views, latched, differs), full=False)
+        return self._scan(record, stamp, _changed_values(self._views, latched, differs), full=False)
 
     def scan_bytes(self, record: ScanRecord, stamp: int, *, full: bool) -> bytes:
         """Return the bytes of the same message.
@@ -253,7 +253,9 @@ class TaskMessages:
             )
         except struct.error:
             # A text, which is stored elsewhere, or a value that does not fit: the codec decides.
-            return self._encode_scan(self._scan(record, stamp, _changed(self._views, latched, differs), full=False))
+            return self._encode_scan(
+                self._scan(record, stamp, _changed_values(self._views, latched, differs), full=False)
+            )
 
     def _learnt(
         self,
@@ -264,7 +266,7 @@ class TaskMessages:
         stamp: int,
         differs: Sequence[bool],
     ) -> bytes:
-        message = self._scan(record, stamp, _changed(self._views, record.latched, differs), full=False)
+        message = self._scan(record, stamp, _changed_values(self._views, record.latched, differs), full=False)
         if not (message.latched.text or message.read.text or message.written.text or message.committed.text):
             patterns.learn(key, lambda: prepared(message, ("stamp",), _HEAD, *groups))
         return self._encode_scan(message)
@@ -302,7 +304,7 @@ def _columns(entries: Sequence[tuple[int, int, Value]]) -> _Columns:
     return views, elements, values
 
 
-def _changed(views: Sequence[int], latched: Latched, differs: Sequence[bool]) -> Values:
+def _changed_values(views: Sequence[int], latched: Latched, differs: Sequence[bool]) -> Values:
     if not differs:
         return NO_VALUES
     return as_values(tuple(compress(views, differs)), (0,) * sum(differs), tuple(compress(latched, differs)))

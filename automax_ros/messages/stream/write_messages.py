@@ -47,15 +47,15 @@ class WriteMessages:
         if len(groups) == 1:
             group = groups[0]
             stamp = epoch_ns + group.time_ns
-            return [(stamp, self._one(group, stamp, run_id))]
+            return [(stamp, self._encode_one(group, stamp, run_id))]
         found = []
         for part in _neighbours(groups):
             stamp = epoch_ns + part[0].time_ns
-            payload = self._one(part[0], stamp, run_id) if len(part) == 1 else self._several(part, stamp, run_id)
+            payload = self._encode_one(part[0], stamp, run_id) if len(part) == 1 else self._several(part, stamp, run_id)
             found.append((stamp, payload))
         return found
 
-    def _one(self, group: WriteGroup, stamp: int, run_id: int) -> bytes:
+    def _encode_one(self, group: WriteGroup, stamp: int, run_id: int) -> bytes:
         views, values = zip(*group.changes, strict=True)
         key = (group.writer, group.kind, group.element, views, run_id)
         pattern = self._patterns.known.get(key)

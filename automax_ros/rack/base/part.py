@@ -76,7 +76,7 @@ class RackPart:
 
         Plants that no drive turns are in the process with common memory (decision).
         """
-        coupled = _coupled(self.config.plants)
+        coupled = _find_coupled(self.config.plants)
         slots = {item.name: item.slot for item in driven_plants(self.config)}
         found = []
         for plant in self.config.plants:
@@ -95,7 +95,7 @@ class RackPart:
         return frozenset(found)
 
 
-def _coupled(plants: Sequence[PlantConfig]) -> dict[str, set[str]]:
+def _find_coupled(plants: Sequence[PlantConfig]) -> dict[str, set[str]]:
     groups = {plant.name: {plant.name} for plant in plants}
     for plant in plants:
         if plant.couple is not None:

@@ -220,10 +220,10 @@ class ImageSync:
         self._memory.now_ns = self._rack.now_ns
         for view, element, value in batch.entries:
             self._take(view, element, value, batch)
-        self._tell_shaped(batch)
-        self._tell()
+        self._send_shaped(batch)
+        self._report_writes()
 
-    def _tell_shaped(self, batch: Batch) -> None:
+    def _send_shaped(self, batch: Batch) -> None:
         """Send back values that an input changed, as a counter of 24 bits does: all images must hold them."""
         sent = {(view, element): value for view, element, value in batch.entries}
         for cause in self._memory.take_causes():
@@ -238,7 +238,7 @@ class ImageSync:
             self._take_held(held)
         for force in picture.forces:
             self._hold(force)
-        self._tell()
+        self._report_writes()
 
     def _take(self, view: int, element: int, sent: Value, batch: Batch) -> None:
         value = self._fitting(view, element, sent)
@@ -289,7 +289,7 @@ class ImageSync:
         else:
             self._memory.release(force.view, force.element, writer)
 
-    def _tell(self) -> None:
+    def _report_writes(self) -> None:
         self._memory.take_causes()
         self._rack.observers.report_writes()
 

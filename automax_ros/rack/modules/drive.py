@@ -241,7 +241,7 @@ class DriveControllerModule:
         self._command_key = EventKey(EventClass.IO, config.slot, "command")
         self._delayed: tuple[Command, ScheduledEvent] | None = None
         parts.drives.attach(config.slot, self)
-        parts.memory.watch_accesses(bank.view, self._accessed)
+        parts.memory.watch_accesses(bank.view, self._count_access)
 
     @property
     def timing(self) -> InterruptTiming:
@@ -363,7 +363,7 @@ class DriveControllerModule:
         self._digital.show(0 if tripped else command.relays, ok=command.ok and not tripped)
         self._interrupts.follow(command.next_ns)
 
-    def _accessed(self) -> None:
+    def _count_access(self) -> None:
         self._accesses += 1
 
     def _delay(self, command: Command, due_ns: int) -> None:

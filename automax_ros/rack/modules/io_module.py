@@ -64,7 +64,7 @@ class IoModule:
         for first in registers.counters:
             shown = sorted(parts.memory.registers.showing(view, [first]))
             doubles = [key for key in shown if parts.memory.specs[key[0]].type is DataType.DOUBLE]
-            parts.inputs.shape(doubles, _counted)
+            parts.inputs.shape(doubles, _counter_value)
 
     def power_on(self) -> None:
         """Start nothing: no register drives the clock yet."""
@@ -177,5 +177,5 @@ class _PeriodicInterrupt:
         interrupts.post(self._bank, self.status, now_ns, skipped)
 
 
-def _counted(value: Value) -> Value:
+def _counter_value(value: Value) -> Value:
     return sign_extended(int(value), _COUNTER_BITS)

@@ -181,7 +181,7 @@ class NetworkModule(QuietModule):
             self._process_depth()
         self._show_drops()
         if self._is_master or self._reception.drops[MASTER].is_received:
-            frames = [self._frame(drop) for drop in self._sent()]
+            frames = [self._frame(drop) for drop in self._sent_registers()]
             self._count["transmitted"] += len(frames)
             if self._send is not None:
                 self._send(now_ns, frames)
@@ -219,7 +219,7 @@ class NetworkModule(QuietModule):
                 self._bits[index] = bits
                 self._write(STATUS[index], bits)
 
-    def _sent(self) -> Iterable[int]:
+    def _sent_registers(self) -> Iterable[int]:
         if not self._is_master:
             return self._drops
         return [MASTER, *sorted({*self._named, *self._written})]

@@ -63,7 +63,7 @@ def copies_of(programs: Sequence[Program], bank: int, memory: CommonMemory) -> t
             written.update(dict.fromkeys(_sent_with(name, bank, memory), program.name))
     every = {register for register in (*used, *written) if register in EVERY_SCAN}
     nth = {register for register in (*used, *written) if register not in EVERY_SCAN}
-    return _copied(every, written, bank, memory.registers), _copied(nth, written, bank, memory.registers)
+    return _plan_copies(every, written, bank, memory.registers), _plan_copies(nth, written, bank, memory.registers)
 
 
 def application_registers(name: str, bank: int, memory: CommonMemory) -> range:
@@ -82,7 +82,7 @@ def _sent_with(name: str, bank: int, memory: CommonMemory) -> range:
     return own
 
 
-def _copied(registers: Iterable[int], written: dict[int, str], bank: int, views: RegisterMap) -> Copied:
+def _plan_copies(registers: Iterable[int], written: dict[int, str], bank: int, views: RegisterMap) -> Copied:
     in_order = sorted(registers)
     inputs = views.showing(bank, [register for register in in_order if register not in written])
     outputs: dict[str, tuple[Key, ...]] = {}

@@ -109,7 +109,7 @@ class ForceTable:
 
     def load(self) -> None:
         """Update memory after tasks were restored from a state: whether any local is forced."""
-        self._memory.note_locals(forced=self._any_local(), told=False)
+        self._memory.note_locals(forced=self._any_local(), report=False)
 
     def _force_local(self, meant: LocalElement, value: Value, writer: int) -> None:
         symbol, forces = meant.variable, meant.task.forces

@@ -267,7 +267,7 @@ class Operations:
         released = self._hold_again(item, forces)
         self.deleted -= {name}
         self.reports.done("reload", name, detail=KEEP_STATE if keep_state else "")
-        self._tell_released(item, released)
+        self._report_released(item, released)
         if ran:
             self._run_together([item], self._next_tick)
 
@@ -287,7 +287,7 @@ class Operations:
         self._hold_again(item, {})
         self.deleted |= {name}
         self.reports.done("delete", name)
-        self._tell_released(item, released)
+        self._report_released(item, released)
 
     def power(self, off_for_ns: int, *, battery: bool = True) -> None:
         """Switch the power off, and on again after a time, unless ``power_on`` does so before.
@@ -410,7 +410,7 @@ class Operations:
         self._observers.report_writes()
         return released
 
-    def _tell_released(self, item: ScheduledTask, names: Sequence[str]) -> None:
+    def _report_released(self, item: ScheduledTask, names: Sequence[str]) -> None:
         if names:
             self.reports.done("unforce", item.name, detail=" ".join(names))
 

@@ -79,7 +79,7 @@ class ValueOperations:
                 as the Executive allows, or the power is off.
         """
         self._operations.need_power("force")
-        meant = self._meant("force", variable)
+        meant = self._find_target("force", variable)
         if isinstance(meant, Element) and meant.variable.is_array:
             self._refuse("force", f"{meant.label} cannot be forced: it is an element of an array")
         task = meant.task.name if isinstance(meant, LocalElement) else ""
@@ -95,7 +95,9 @@ class ValueOperations:
         """
         self._operations.need_power("unforce")
         forced = self._forcing.targets()
-        released = list(forced.values()) if variables is None else [self._meant("unforce", item) for item in variables]
+        released = (
+            list(forced.values()) if variables is None else [self._find_target("unforce", item) for item in variables]
+        )
         for target in released:
             if target.label not in forced:
                 self._refuse("unforce", f"{target.label} is not forced")
@@ -131,7 +133,7 @@ class ValueOperations:
                 power is off.
         """
         self._operations.need_power("tune")
-        self._change(self._meant("tune", variable), value)
+        self._change(self._find_target("tune", variable), value)
 
     def tune_step(self, name: str, steps: int) -> None:
         """Raise a tunable by whole steps of its STEP, or lower it by negative ones; it stops at its limits (decision).
@@ -145,7 +147,7 @@ class ValueOperations:
 
     def _write(self, what: str, variable: str | Target, value: Value) -> str:
         """Write a common or an element; return its full name."""
-        found = self._meant(what, variable)
+        found = self._find_target(what, variable)
         assert isinstance(found, Element)
         if not self._config.is_input(found.variable) and not self._operations.powered:
             self._refuse(what, POWER_OFF)
@@ -167,7 +169,7 @@ class ValueOperations:
             self._refuse("tune", str(error), meant.task.name)
         self._operations.reports.done("tune", meant.task.name, detail=_assignment(meant.label, value))
 
-    def _meant(self, what: str, variable: str | Target) -> Target:
+    def _find_target(self, what: str, variable: str | Target) -> Target:
         if isinstance(variable, LocalElement) and not variable.is_current:
             variable = variable.label
         return self.find(what, variable) if isinstance(variable, str) else variable

@@ -18,7 +18,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.runtime.tasks.task import Status
 
 LONGEST_STEP_NS = NS_PER_S
-"""Most rack time of one step (decision: whoever waits for the rack meanwhile does not wait long)."""
+"""Most rack time of one step (decision: what waits for the rack meanwhile does not wait long)."""
 DONE, TIME_OVER, STOPPED = "done", "the time is over", "STOP ALL"
 """The reasons for which a step ends."""
 

@@ -53,20 +53,20 @@ class Readings:
         for name in names:
             if len(name) > MAX_NAME:
                 raise OperationRefused(f"a name of {len(name)} characters: the longest has {MAX_NAME}")
-            found |= {item.name: item for item in self._meant("".join(name.split()).upper(), name)}
+            found |= {item.name: item for item in self._requested_readings("".join(name.split()).upper(), name)}
             if len(found) > MAX_NAMES:
                 raise OperationRefused(f"the names mean {len(found)} values: at most {MAX_NAMES} are read at once")
         return list(found.values())
 
     def tasks_named(self, task: str) -> list[str]:
         """Return a task, or all of the rack without a name."""
-        return [self._known(task)] if task.strip() else [item.name for item in self._rack.tasks]
+        return [self._check_known(task)] if task.strip() else [item.name for item in self._rack.tasks]
 
-    def _meant(self, plain: str, asked: str) -> Iterable[Reading]:
+    def _requested_readings(self, plain: str, asked: str) -> Iterable[Reading]:
         owner, dot, local = plain.partition(".")
         is_pattern = any(char in plain for char in _WILD)
         if dot:
-            task = self._known(owner)
+            task = self._check_known(owner)
             own = self._matching(local, self._locals(task), f"task {task} has no") if is_pattern else [local]
             return [Reading(f"{task}.{name}", self._local(task, name)) for name in own]
         if not is_pattern:
@@ -113,7 +113,7 @@ class Readings:
         fields = self._rack.task(task).layout.fields
         return [field.name for field in fields if field.role in (Role.LOCAL, Role.TUNABLE)]
 
-    def _known(self, name: str) -> str:
+    def _check_known(self, name: str) -> str:
         plain = name.strip().upper()
         if plain not in {item.name for item in self._rack.tasks}:
             known = sorted(task.name for _, task in self._rack.config.placed_tasks)

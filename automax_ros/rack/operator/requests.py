@@ -100,8 +100,8 @@ class OperatorRequests:
 
     def time_now(self) -> Fields:
         """Return whether rack time runs."""
-        stands = "stands still" if self._halting.halted else "goes on"
-        return {"message": f"rack time {stands} at {self._now_s:.9g} s"}
+        state = "is frozen" if self._halting.halted else "runs"
+        return {"message": f"rack time {state} at {self._now_s:.9g} s"}
 
     def step(self, what: str, task: str = "", count: int = 1, until_s: float = 0.0) -> Fields:
         """Execute scans or ticks of a halted rack, one for a ``count`` of 0, or run until a rack time."""

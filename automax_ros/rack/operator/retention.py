@@ -141,7 +141,7 @@ class Retention:
         )
         self._views = [view for view, lost in enumerate(volatile) if not lost]
         self._registers = list(_kept_registers(rack))
-        self._saved: Document = self._installed()
+        self._saved: Document = self._capture_installed()
 
     def restore(self) -> Restored:
         """Restore tasks and forces, and return the settings to be written at the start; nothing if no state was kept.
@@ -158,7 +158,7 @@ class Retention:
                 return Restored()
             raise self._fault("AMX6710", f"cannot be used: it {fault}") from fault
         try:
-            return self._restored(json.loads(data, parse_constant=_no_number))
+            return self._restore(json.loads(data, parse_constant=_no_number))
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise self._fault("AMX6711", f"is damaged: {_reason(error)}") from error
 
@@ -207,7 +207,7 @@ class Retention:
         for view, element in self._registers:
             yield element_name(variables[view], element), memory.read_now(view, element)
 
-    def _installed(self) -> Document:
+    def _capture_installed(self) -> Document:
         """Return the state at the start of a rack without a kept state: it need not be written."""
         document = self.present()
         for view in self._views:
@@ -216,7 +216,7 @@ class Retention:
                 document["commons"][variable.name]["values"] = list(variable.presets)
         return document
 
-    def _restored(self, document: Document) -> Restored:
+    def _restore(self, document: Document) -> Restored:
         if document["format"] != FORMAT:
             raise ValueError(f"its format is {document['format']!r}, not {FORMAT}")
         if document["rack"] != self._rack.config.name:
@@ -262,7 +262,7 @@ class Retention:
     def _compare_shapes(self, variable: CommonVariable, kept: Document) -> None:
         if kept != _shape(variable):
             place = f"{self._rack.config.path}:{variable.line}"
-            message = f"{variable.name} was kept as {_described(kept)}; {place} defines {_described(_shape(variable))}"
+            message = f"{variable.name} was kept as {_describe(kept)}; {place} defines {_describe(_shape(variable))}"
             raise self._misfit(message)
 
     def _restore_tasks(self, kept: Mapping[str, KeptTask], notes: list[str]) -> int:
@@ -339,7 +339,7 @@ def _shape(variable: CommonVariable) -> Document:
     return {"type": variable.type.word, "dimensions": list(variable.dimensions), "length": variable.length}
 
 
-def _described(shape: Document) -> str:
+def _describe(shape: Document) -> str:
     largest = ",".join(str(size - 1) for size in shape["dimensions"])
     length = f" of {shape['length']} characters" if shape["length"] else ""
     return f"{shape['type']}{length}{f' ({largest})' if largest else ''}"

@@ -133,7 +133,7 @@ class Installation:
         """Check and compile another source for a task of the rack; safe on any thread, since nothing is changed."""
         among = self._programs
         try:
-            program = self._checked(task, source, among)
+            program = self._check(task, source, among)
             compiled = self._native.form(self._compile(task, program)).compiled
         except RackError as fault:
             return PreparedReload(task, source, None, among, among, fault)
@@ -151,7 +151,7 @@ class Installation:
         self._programs = prepared.programs
         return prepared.compiled
 
-    def _checked(self, task: str, source: SourceText, among: Mapping[str, Program]) -> Program:
+    def _check(self, task: str, source: SourceText, among: Mapping[str, Program]) -> Program:
         module = self._module(task)
         result = check_source(source, task, module.tick_ns, commons_of(self._config), module.times)
         if result.program is not None:

@@ -198,7 +198,7 @@ class WaitTrigger:
         """Schedule the first burst at ``first_ns``; a task that waits already continues to wait."""
         self.disarm()
         self._due = due
-        self._task.suspended = self._suspended
+        self._task.suspended = self._handle_suspension
         if self._task.ready:
             self._go_on_at(first_ns)
         else:
@@ -222,7 +222,7 @@ class WaitTrigger:
         due_ns = self._scheduler.due_ns(self._event)
         return self._scheduler.now_ns if due_ns is None else due_ns
 
-    def _suspended(self) -> None:
+    def _handle_suspension(self) -> None:
         if self._task.status is Status.RUNNING and self._due is not None:
             self._wait()
 

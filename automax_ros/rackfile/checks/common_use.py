@@ -56,13 +56,13 @@ def writer_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict
         for write in _writes(program):
             own.setdefault(write.target.name, []).append(write)
         for name, writes in own.items():
-            pair = _same(written.get(name, []), writes)
+            pair = _common_writes(written.get(name, []), writes)
             if pair is not None:
                 first, second = pair
                 message = (
                     f"{name} is written here, and in line {first.line} of {files[first.task]} by task {first.task}"
                 )
-                hint = "whoever writes last wins: let one task write it, or give each a common of its own"
+                hint = "the last writer wins: use one task to write it, or give each its own common"
                 diagnostic = Diagnostic("AMX6495", message, second.target.span, second.line, hint)
                 found.setdefault(task.name, []).append(diagnostic)
             written.setdefault(name, []).extend(writes)
@@ -75,12 +75,12 @@ def rack_warnings(config: RackConfig, programs: Mapping[str, Program]) -> list[D
     AMX6496: tasks read a common that is never written; AMX6497: commons that are never used; AMX6498: the 57C406 of a
     current minor loop has no plant.
     """
-    return [*_unwritten(config, programs), *_unused(config, programs), *_without_plant(config, programs)]
+    return [*_find_unwritten(config, programs), *_find_unused(config, programs), *_without_plant(config, programs)]
 
 
-def _unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
+def _find_unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
     files = {task.name: task.file.name for _, task in config.placed_tasks}
-    written = _connected(config)
+    written = _connected_names(config)
     written |= {item.name for item in config.declared if item.direction is Direction.IN or item.preset is not None}
     for program in programs.values():
         written |= {target.name for target, _, _ in _targets(program, (*program.startup, *program.scan))}
@@ -93,19 +93,19 @@ def _unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[
         if read is not None and variable.name not in written and variable.point is None:
             zero = {"BOOLEAN": "FALSE", "STRING": "empty"}.get(variable.type.word, "0")
             place = f"line {read[1]} of {read[0]}"
-            message = f"{variable.name} is read in {place}, and nobody writes it: it stays {zero}"
+            message = f"{variable.name} is read in {place}, and no task writes it: it stays {zero}"
             hint = "let a task write it; or write ros: in for what comes from outside, or a preset"
             yield Diagnostic("AMX6496", message, _place(config, variable.line), hint=hint)
 
 
-def _unused(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
+def _find_unused(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
     declared = {
         symbol.name
         for program in programs.values()
         for symbol in program.symbols.values()
         if symbol.scope is Scope.COMMON
     }
-    declared |= _connected(config)
+    declared |= _connected_names(config)
     unused = [item for item in config.declared if item.name not in declared and item.point is None]
     if unused and programs:
         named = [f"{item.name} (line {item.line})" for item in unused[:_NAMED]]
@@ -129,7 +129,7 @@ def _without_plant(config: RackConfig, programs: Mapping[str, Program]) -> Itera
             yield Diagnostic("AMX6498", message, _place(config, drive.line), hint=hint)
 
 
-def _connected(config: RackConfig) -> set[str]:
+def _connected_names(config: RackConfig) -> set[str]:
     return {*PREDEFINED, *(feed.common for feed in config.feeds), *(item.common for item in config.joint_commands)}
 
 
@@ -139,7 +139,7 @@ def _place(config: RackConfig, line: int) -> Span:
     return Span(line, start + 1, start + 1 + len(re.split(r"[\s:]", text[start:])[0]))
 
 
-def _same(first: list[_Write], second: list[_Write]) -> tuple[_Write, _Write] | None:
+def _common_writes(first: list[_Write], second: list[_Write]) -> tuple[_Write, _Write] | None:
     """Return a write of each of two tasks to one variable or element; None if there is none, or for a handshake."""
     if all(item.is_constant for item in (*first, *second)):
         return None

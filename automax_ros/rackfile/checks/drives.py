@@ -112,20 +112,20 @@ def given_inputs(
         for name, value in written_constants(program, Scope.COMMON).items():
             assigned[name] = None if name in assigned else value
     assigned |= written_constants(drive.program, Scope.LOCAL)
-    given = {name: _given(value, source_text(value), "default") for name, value in call.defaults.items()}
+    given = {name: _make_given(value, source_text(value), "default") for name, value in call.defaults.items()}
     for item in call.block.inputs:
         expression = call.arguments.get(item.name)
         if expression is not None:
-            given[item.name] = _programmed(expression, drive.program, config, assigned, settings)
+            given[item.name] = _evaluate_programmed(expression, drive.program, config, assigned, settings)
     return given
 
 
-def _given(value: Value | None, text: str, source: str = "") -> Given:
+def _make_given(value: Value | None, text: str, source: str = "") -> Given:
     number = float(value) if isinstance(value, (bool, int, float)) else None
     return Given(number, f"{text} ({source})" if source else text)
 
 
-def _programmed(
+def _evaluate_programmed(
     expression: Expression,
     program: Program,
     config: RackConfig,
@@ -134,15 +134,15 @@ def _programmed(
 ) -> Given:
     value = constant_value(expression)
     if value is not None:
-        return _given(value, source_text(value))
+        return _make_given(value, source_text(value))
     operand = expression.operand if isinstance(expression, Unary) else expression
     name = print_expression(operand)
     value, source = _present(name, program, config, assigned, settings)
     if value is None:
-        return _given(None, name, "not known")
+        return _make_given(None, name, "not known")
     if isinstance(expression, Unary):
         value = not value if isinstance(value, bool) else -value if isinstance(value, (int, float)) else value
-    return _given(value, f"{print_expression(expression)} = {source_text(value)}", source)
+    return _make_given(value, f"{print_expression(expression)} = {source_text(value)}", source)
 
 
 def _present(

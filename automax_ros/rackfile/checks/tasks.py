@@ -57,7 +57,7 @@ def check_tasks(config: RackConfig, sources: Mapping[str, SourceText] | None = N
     rack file was loaded and cannot be read now, that is an error of its task (AMX6306).
     """
     commons = commons_of(config)
-    checked = [_checked(module, task, commons, config, sources) for module, task in config.placed_tasks]
+    checked = [_check_task(module, task, commons, config, sources) for module, task in config.placed_tasks]
     programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
     found = findings_by_task(config, programs)
     return [item._replace(result=with_findings(item.result, found.get(item.task.name, ()))) for item in checked]
@@ -69,7 +69,7 @@ def forgotten(config: RackConfig, checked: Sequence[CheckedTask]) -> list[Diagno
     return rack_warnings(config, programs) if len(programs) == len(checked) else []
 
 
-def _checked(
+def _check_task(
     module: ModuleConfig,
     task: TaskConfig,
     commons: Mapping[str, CommonSpec],

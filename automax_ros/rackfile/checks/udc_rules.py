@@ -107,7 +107,7 @@ class _Udc:
             others = [
                 other
                 for other in self.points.values()
-                if other.name not in outputs and pair in (register & ~1 for register in _taken(other))
+                if other.name not in outputs and pair in (register & ~1 for register in _occupied_registers(other))
             ]
             if others:
                 reported.add(pair)
@@ -128,7 +128,7 @@ class _Udc:
                 continue
             for item in self._written_by(program):
                 other = next((taken[bit] for bit in _bits(item.variable) if bit in taken), None)
-                if other is not None and _taken(other.variable)[0] in APPLICATION:
+                if other is not None and _occupied_registers(other.variable)[0] in APPLICATION:
                     message = (
                         f"{item.variable.name} is written here, {other.variable.name} by the UDC's task {other.task}"
                     )
@@ -202,7 +202,7 @@ def _drive_constants(bound: BoundCall) -> Iterator[tuple[str, str, object]]:
             yield item.name, item.drive_parameter, given.value
 
 
-def _taken(variable: CommonVariable) -> range:
+def _occupied_registers(variable: CommonVariable) -> range:
     assert variable.point is not None
     first = variable.point.register
     return range(first, first + (2 if variable.type in (DataType.DOUBLE, DataType.REAL) else 1))
@@ -211,4 +211,4 @@ def _taken(variable: CommonVariable) -> range:
 def _bits(variable: CommonVariable) -> Iterable[tuple[int, int]]:
     assert variable.point is not None
     bits = range(16) if variable.point.bit is None else (variable.point.bit,)
-    return [(register, bit) for register in _taken(variable) for bit in bits]
+    return [(register, bit) for register in _occupied_registers(variable) for bit in bits]

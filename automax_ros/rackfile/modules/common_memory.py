@@ -42,7 +42,7 @@ class CommonMemoryKind(ModuleKind):
         """Report common memory in an odd slot (J-3636 p. 1-1)."""
         for item in rack.of(self):
             if item.slot % 2:
-                message = f"the {item.model} cannot stand in slot {item.slot}"
+                message = f"the {item.model} cannot be in slot {item.slot}"
                 hint = "common memory stands in slot 0, or with registers of user data in another even slot"
                 rack.findings.add("AMX6208", message, item.span, hint)
 

@@ -131,12 +131,12 @@ class Pc3000Kind(ProcessorKind):
         own = rack.of(self)
         for item in own[:1]:
             if item.slot != 0:
-                message = f"the PC3000 {item.model} stands in slot 0 of a rack of its own, not in slot {item.slot}"
+                message = f"the PC3000 {item.model} is in slot 0 of a separate rack, not in slot {item.slot}"
                 rack.findings.add("AMX6773", message, item.span)
         for item in rack.placed if own else ():
             if item is not own[0]:
                 message = f"the {item.model} in slot {item.slot} cannot stand next to a PC3000, which has no slots"
-                hint = "write a rack of its own for each of them"
+                hint = "write a separate rack for each of them"
                 rack.findings.add("AMX6773", message, item.span, hint)
 
 

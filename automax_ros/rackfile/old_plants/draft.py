@@ -303,7 +303,7 @@ def _sources(folder: Path) -> list[Path]:
     except (OSError, ValueError) as error:
         raise DraftFault(f"{folder} cannot be read: {getattr(error, 'strerror', None) or error}") from error
     if len(entries) > _MOST_FILES:
-        raise DraftFault(f"{folder} holds more than {_MOST_FILES} files", "put the tasks into a folder of their own")
+        raise DraftFault(f"{folder} holds more than {_MOST_FILES} files", "put the tasks into a separate folder")
     return sorted(path for path in entries if is_task_file(path))
 
 

@@ -63,7 +63,7 @@ def convert(data: bytes, check: Check) -> Converted:
     a text of PRINT with more than 132 characters is printed in parts (decision: what an old Executive took, and the
     file of a DOS editor).
     """
-    text, encoding, notes = _decoded(data)
+    text, encoding, notes = _decode(data)
     text, _, rest = text.partition(END_OF_FILE)
     if rest or END_OF_FILE in data.decode("latin-1"):
         notes.append(f"Ctrl-Z and the {count_of(len(rest), 'character')} after it left out")
@@ -82,7 +82,7 @@ def convert(data: bytes, check: Check) -> Converted:
     return Converted(before, after, after.encode(encoding), tuple(notes))
 
 
-def _decoded(data: bytes) -> tuple[str, str, list[str]]:
+def _decode(data: bytes) -> tuple[str, str, list[str]]:
     """Return the text, the encoding to write it in, and notes; bytes that are not UTF-8 become one character each."""
     if data.startswith(_UTF_16):
         try:

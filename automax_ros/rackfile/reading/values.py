@@ -20,7 +20,7 @@ from automax_ros.core.values import is_number, number, value_of, whole_number
 from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence
 
 MAX_FINDINGS = 200
-"""Most errors, and most warnings, that one file reports (decision: nobody reads more; hostile files have millions)."""
+"""Most errors, and most warnings, that one file reports (decision: more are not read; hostile files have millions)."""
 _YAML_CODES = {Flaw.SYNTAX: "AMX6003", Flaw.EXTRA: "AMX6004", Flaw.SIZE: "AMX6005"}
 _OCTAL = re.compile(r"[-+]?0+[0-9]")
 """Leading zeros make YAML read another number."""

@@ -104,7 +104,7 @@ _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 def _preset(node: Node | None, variable: CommonVariable, findings: ProblemList) -> Value | tuple[Value, ...] | None:
     what = f"preset of {variable.name}"
     if not isinstance(node, Sequence):
-        return None if node is None else _one(node, variable, what, findings)
+        return None if node is None else _read_one(node, variable, what, findings)
     if not variable.is_array:
         findings.add(_CODE, f"{what} is a list, but the variable is not an array", node.span)
         return None
@@ -112,11 +112,11 @@ def _preset(node: Node | None, variable: CommonVariable, findings: ProblemList) 
         message = f"{what} has {len(node.items)} values; the array has {variable.elements} elements"
         findings.add(_CODE, message, node.span, "subscripts count from 0: an array (10) has 11 elements")
         return None
-    values = [_one(item, variable, what, findings) for item in node.items]
+    values = [_read_one(item, variable, what, findings) for item in node.items]
     return tuple(value for value in values if value is not None) if None not in values else None
 
 
-def _one(node: Node, variable: CommonVariable, what: str, findings: ProblemList) -> Value | None:
+def _read_one(node: Node, variable: CommonVariable, what: str, findings: ProblemList) -> Value | None:
     kind = variable.type
     if kind is DataType.STRING:
         text = text_value(node, what, findings, limit=1000)

@@ -118,8 +118,8 @@ class BagInfo(Tally):
     @property
     def gap_texts(self) -> list[str]:
         """Gaps that do not make the recording unsound, from its recorder's data, its write log and its scans."""
-        told = self.custom_data.get("gaps", "")
-        found = [f"the recorder says: {told}"] if told else []
+        recorded = self.custom_data.get("gaps", "")
+        found = [f"the recorder's note: {recorded}"] if recorded else []
         scans = [f"{count_of(task.missing, 'scan')} of {name}" for name, task in self.tasks.items() if task.missing]
         return [*found, *self.gaps, *(f"{text} not there" for text in scans)]
 
@@ -211,9 +211,9 @@ def _count(info: BagInfo, record: object) -> None:
         if name == _SCAN:
             _count_scan(info, record)
         elif name == _OPERATION and len(info.operations) < MOST_KEPT:
-            info.operations.append(_decoded(info, _OPERATION, record))
+            info.operations.append(_decode(info, _OPERATION, record))
         elif name == _TABLE and info.table is None:
-            table = _decoded(info, _TABLE, record)
+            table = _decode(info, _TABLE, record)
             variables_of(info.path, table)
             info.table = table
         elif name == _STRING and record.channel.topic.endswith(_FILES_TOPIC) and not info.texts:
@@ -234,7 +234,7 @@ def _count_scan(info: BagInfo, record: RawMessage) -> None:
         task = info.tasks[head.task] = TaskInfo()
     task.count(head.scan)
     if record.data[-len(_NO_ERRORS) :] != _NO_ERRORS:
-        for logged in _decoded(info, _SCAN, record).errors:
+        for logged in _decode(info, _SCAN, record).errors:
             if logged in task.errors or len(task.errors) < MOST_KEPT:
                 task.errors[logged] += 1
 
@@ -246,7 +246,7 @@ def _keep_sent_files(info: BagInfo, record: RawMessage) -> None:
         info.texts.update((file.name, file.text) for file in files_from_text(message.data))
 
 
-def _decoded(info: BagInfo, type_name: str, record: RawMessage) -> Any:
+def _decode(info: BagInfo, type_name: str, record: RawMessage) -> Any:
     try:
         return decoder(type_name)(record.data)
     except CdrError as error:

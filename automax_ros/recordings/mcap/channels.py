@@ -72,7 +72,7 @@ _HISTORY = {"1": "keep_last", "2": "keep_all"}
 
 def recorded_qos(text: str) -> QosProfile:
     """Return the first profile of ``offered_qos_profiles``; values that cannot be read are those of ``STREAM``."""
-    profiles = _loaded(text)
+    profiles = _load(text)
     profile = profiles[0] if isinstance(profiles, list) and profiles else None
     if not isinstance(profile, dict):
         return STREAM
@@ -94,7 +94,7 @@ def _depth(profile: dict[Any, Any]) -> int:
     return min(depth, MAX_DEPTH) if depth else STREAM.depth
 
 
-def _loaded(text: str) -> Any:
+def _load(text: str) -> Any:
     """Return the data of YAML of bounded depth without aliases, None for any other text."""
     if len(text) > MAX_QOS_BYTES:
         return None

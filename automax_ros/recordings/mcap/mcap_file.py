@@ -149,7 +149,7 @@ class Damage:
         self._resumed += 1
         start = size if self._resumed > _MAX_RESUMED else _next_chunk(file, position + 1, size)
         end = "the end" if start == size else f"byte {start}"
-        self.lose(start - position, f"no whole record stands from byte {position} to {end}")
+        self.lose(start - position, f"no complete record from byte {position} to {end}")
         return start
 
 
@@ -279,7 +279,7 @@ class McapFile:
                 else:
                     self.define(opcode, data[start:end])
         except ValueError as error:
-            raise self._damaged(str(error)) from error
+            raise self._damage_error(str(error)) from error
         self._place = None
 
     def _parts(self, without: frozenset[int]) -> Iterator[tuple[int, bytes]]:
@@ -342,16 +342,16 @@ class McapFile:
         if opcode == Opcode.MESSAGE:
             return content if len(content) >= MESSAGE_FIELDS.size or not self._salvage else None
         if opcode == Opcode.METADATA:
-            return self._parsed(Metadata.read, content)
+            return self._parse(Metadata.read, content)
         if opcode == Opcode.ATTACHMENT:
             if not self._salvage or int.from_bytes(content[-4:], "little") in (0, zlib.crc32(content[:-4])):
-                return self._parsed(Attachment.read, content)
+                return self._parse(Attachment.read, content)
             self.damage.lose(len(content), "an attachment is damaged")
             return None
         return self._cut_chunk(content) if opcode == _CUT else None
 
     def _chunk(self, content: bytes, room: Room | None) -> WholeChunk | None:
-        chunk = self._parsed(Chunk.read, content)
+        chunk = self._parse(Chunk.read, content)
         if chunk is None:
             self.damage.lost_chunks += 1
             return None
@@ -396,20 +396,20 @@ class McapFile:
     def _ends_early(self, stream: CheckedStream) -> BagError:
         return BagError("AMX6812", self.path, f"ends early, at byte {stream.position}", TRUNCATED_HINT)
 
-    def _parsed(self, parse: Callable[[ReadDataStream], _Record], content: bytes) -> _Record | None:
+    def _parse(self, parse: Callable[[ReadDataStream], _Record], content: bytes) -> _Record | None:
         """Parse one record by the package mcap, which cannot read beyond the record's end; None if it is skipped."""
         try:
             return parse(ReadDataStream(io.BytesIO(content)))
         except (McapError, struct.error, ValueError, OverflowError) as error:
             if not self._salvage:
-                raise self._damaged(f"a malformed record: {str(error) or type(error).__name__}") from error
+                raise self._damage_error(f"a malformed record: {str(error) or type(error).__name__}") from error
             self.damage.lose(len(content), "a record is malformed")
             return None
 
     def _check_header(self, opcode: int, content: bytes) -> None:
         if opcode != Opcode.HEADER and not self._salvage:
-            raise self._damaged("the file does not begin with a header")
-        header = self._parsed(Header.read, content) if opcode == Opcode.HEADER else None
+            raise self._damage_error("the file does not begin with a header")
+        header = self._parse(Header.read, content) if opcode == Opcode.HEADER else None
         if header is not None and header.profile != "ros2":
             text = f"holds messages of profile {header.profile[:40]!r}, not 'ros2'"
             hint = f"only recordings of ROS 2 can be {'repaired' if self._salvage else 'read'}"
@@ -418,20 +418,20 @@ class McapFile:
     def _check_end(self, stream: CheckedStream, opcode: int, content: bytes, crc: int) -> None:
         """Check the checksum of the data, or of the section after them and the end of the file."""
         if opcode == Opcode.DATA_END:
-            end = self._parsed(DataEnd.read, content)
+            end = self._parse(DataEnd.read, content)
             self._check_crc(end.data_section_crc if end else 0, crc, "the data")
             return
         if not self.damage.finished:
-            raise self._damaged("a footer without the end of the data")
-        footer = self._parsed(Footer.read, content)
+            raise self._damage_error("a footer without the end of the data")
+        footer = self._parse(Footer.read, content)
         covered = RECORD_HEAD.pack(opcode, len(content)) + content[: -len(b"crc4")]
         self._check_crc(footer.summary_crc if footer else 0, zlib.crc32(covered, crc), "the summary")
         if stream.take(len(MAGIC) + 1) != MAGIC:
-            raise self._damaged("the closing mark is missing or does not end the file")
+            raise self._damage_error("the closing mark is missing or does not end the file")
 
     def _check_crc(self, expected: int, actual: int, what: str) -> None:
         if expected not in (0, actual):
-            raise self._damaged(f"the checksum of {what} is wrong")
+            raise self._damage_error(f"the checksum of {what} is wrong")
 
     def definition(self, opcode: int, content: bytes) -> Schema | Channel | None:
         """Return a schema or channel; None for a malformed one that is skipped.
@@ -440,8 +440,8 @@ class McapFile:
             BagError: it is malformed.
         """
         if opcode == Opcode.SCHEMA:
-            return self._parsed(Schema.read, content)
-        return self._parsed(Channel.read, content)
+            return self._parse(Schema.read, content)
+        return self._parse(Channel.read, content)
 
     def define(self, opcode: int, content: bytes) -> None:
         """Add a schema or channel; files may repeat them, the first one counts.
@@ -460,17 +460,17 @@ class McapFile:
 
     def _message(self, content: bytes) -> RawMessage:
         if len(content) < MESSAGE_FIELDS.size:
-            raise self._damaged(f"a message record of {len(content)} bytes")
+            raise self._damage_error(f"a message record of {len(content)} bytes")
         number, sequence, log_time, publish_time = MESSAGE_FIELDS.unpack_from(content)
         channel = self.channels.get(number)
         if channel is None:
-            raise self._damaged(f"a message on channel {number}, which is not defined")
+            raise self._damage_error(f"a message on channel {number}, which is not defined")
         schema = self.schemas.get(channel.schema_id)
         return RawMessage(channel, schema, sequence, log_time, publish_time, content[MESSAGE_FIELDS.size :])
 
     def _too_large(self, message: str) -> BagError:
         return BagError("AMX6814", self.path, message)
 
-    def _damaged(self, message: str) -> BagError:
+    def _damage_error(self, message: str) -> BagError:
         place = self.position if self._place is None else self._place
         return BagError("AMX6813", self.path, f"{message} (before byte {place})", DAMAGED_HINT)

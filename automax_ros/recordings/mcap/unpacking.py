@@ -54,11 +54,11 @@ class Unpacker:
             try:
                 data = self._whole(chunk.compression, chunk.data, size)
             except (zstandard.ZstdError, RuntimeError, EOFError) as error:  # lz4 raises RuntimeError
-                raise self._damaged(f"a chunk cannot be decompressed: {error}") from error
+                raise self._damage_error(f"a chunk cannot be decompressed: {error}") from error
         if len(data) != size:
-            raise self._damaged(f"a chunk has {len(data)} bytes and should have {size}")
+            raise self._damage_error(f"a chunk has {len(data)} bytes and should have {size}")
         if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-            raise self._damaged("the checksum of a chunk is wrong")
+            raise self._damage_error("the checksum of a chunk is wrong")
         if place is None or data is place:
             return data
         place[:] = data
@@ -111,7 +111,7 @@ class Unpacker:
         # zstandard allocates the size that the frame states, so that must be checked too.
         stated = zstandard.get_frame_parameters(data).content_size
         if stated not in (size, zstandard.CONTENTSIZE_UNKNOWN):
-            raise self._damaged(f"a chunk holds {stated} bytes and should hold {size}")
+            raise self._damage_error(f"a chunk holds {stated} bytes and should hold {size}")
         return self._zstd.decompress(data, max_output_size=size) if size else b""
 
     def _is_in(self, place: memoryview, chunk: Chunk) -> bool:
@@ -125,5 +125,5 @@ class Unpacker:
                     return reader.readinto(place) == len(place) and not reader.read(1)
         return False
 
-    def _damaged(self, message: str) -> BagError:
+    def _damage_error(self, message: str) -> BagError:
         return BagError("AMX6813", self._path, message, DAMAGED_HINT)

@@ -123,18 +123,18 @@ class _BlockFile:
                 if isinstance(record, WholeChunk):
                     data, begin = self._buffer.taken()
                     if data is not self._data:
-                        yield from self._kept()
+                        yield from self._take_kept()
                         self._data = data
                     self._chunks.append((begin, record))
                 else:
-                    yield from self._kept()
+                    yield from self._take_kept()
                     yield from self._one_by_one(record)
         except BagError:
-            yield from self._kept()
+            yield from self._take_kept()
             raise
-        yield from self._kept()
+        yield from self._take_kept()
 
-    def _kept(self) -> Iterator[MessageBlock | BagMessage]:
+    def _take_kept(self) -> Iterator[MessageBlock | BagMessage]:
         """Yield the messages of the chunks kept so far, as one block if possible, and discard the chunks."""
         chunks, self._chunks = self._chunks, []
         whole = self._whole_table(chunks)
@@ -160,13 +160,13 @@ class _BlockFile:
             return None
         begin = chunks[0][0]
         ends = [place - begin + len(chunk.data) for place, chunk in chunks]
-        return self._admitted(self._table_of(self._data[begin : begin + ends[-1]].data, ends))
+        return self._admit(self._table_of(self._data[begin : begin + ends[-1]].data, ends))
 
     def _table(self, chunk: WholeChunk) -> ChunkTable | None:
         """Return the table of the messages of a chunk; None if they must be read one by one."""
-        return self._admitted(self._table_of(chunk.data, [len(chunk.data)]))
+        return self._admit(self._table_of(chunk.data, [len(chunk.data)]))
 
-    def _admitted(self, table: ChunkTable | None) -> ChunkTable | None:
+    def _admit(self, table: ChunkTable | None) -> ChunkTable | None:
         """Return a table if all its messages can be read, and add its definitions and times; else return None."""
         if table is None or not self._is_defined(table):
             return None
@@ -241,9 +241,9 @@ class _BlockFile:
         """Yield the messages of these tables as a block."""
         if not tables:
             return
-        starts = _joined([table.starts + begin for begin, table in tables])
-        numbers, lengths = (_joined([getattr(table, name) for _, table in tables]) for name in ("numbers", "lengths"))
-        log_times, stamps = (_joined([getattr(table, name) for _, table in tables]) for name in ("log_times", "stamps"))
+        starts = _join([table.starts + begin for begin, table in tables])
+        numbers, lengths = (_join([getattr(table, name) for _, table in tables]) for name in ("numbers", "lengths"))
+        log_times, stamps = (_join([getattr(table, name) for _, table in tables]) for name in ("log_times", "stamps"))
         columns: tuple[NDArray[Any], ...] = self._kinds[numbers], numbers, starts, lengths, log_times, stamps
         if (columns[0] < 0).any():
             wanted = np.flatnonzero(columns[0] >= 0)
@@ -266,5 +266,5 @@ class _BlockFile:
                 yield channel.decoded(raw)
 
 
-def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
+def _join(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return columns[0] if len(columns) == 1 else np.concatenate(columns)

@@ -47,7 +47,7 @@ def checked_table(table: VariableTable) -> dict[str, Variable]:
         if not _NAME.fullmatch(entry.name):
             raise ValueError(f"variable {entry.id} is named {entry.name[:80]!r}")
         if entry.name in by_name:
-            raise ValueError(f"variable {entry.name} stands in it twice")
+            raise ValueError(f"variable {entry.name} is listed twice")
         DataType.numbered(entry.type)
         by_name[entry.name] = entry
     if len({entry.id for entry in by_name.values()}) < len(by_name):
@@ -178,7 +178,7 @@ class CommonLog:
         Raises:
             BagError: they do not fit the table of variables.
         """
-        return self._typed(values, stamp, self._read_kinds)
+        return self._typed_entries(values, stamp, self._read_kinds)
 
     def entries(self, values: Values, stamp: int) -> list[Entry]:
         """Return the entries of a message, each in its variable's own type.
@@ -186,9 +186,9 @@ class CommonLog:
         Raises:
             BagError: they do not fit the table of variables.
         """
-        return self._typed(values, stamp, self._kinds)
+        return self._typed_entries(values, stamp, self._kinds)
 
-    def _typed(self, values: Values, stamp: int, kinds: Mapping[int, _Kind]) -> list[Entry]:
+    def _typed_entries(self, values: Values, stamp: int, kinds: Mapping[int, _Kind]) -> list[Entry]:
         if not values.variable:
             return []
         texts = iter(values.text)
@@ -257,27 +257,27 @@ class WatchedValues:
     def __init__(self, watched: Sequence[Watched]) -> None:
         self._columns = {(item.variable, item.element): index for index, item in enumerate(watched)}
         self._shown: dict[int, Cell] = {}
-        self._told: dict[int, Cell] = {}
+        self._received: dict[int, Cell] = {}
 
     def take(self, entries: Iterable[Entry]) -> None:
         """Set the values of one message."""
         for variable, place, value in entries:
             index = self._columns.get((variable, place))
             if index is not None:
-                self._told[index] = value
+                self._received[index] = value
 
-    def tell(self, index: int, value: Cell) -> None:
+    def set_value(self, index: int, value: Cell) -> None:
         """Set the value of one column."""
-        self._told[index] = value
+        self._received[index] = value
 
     def changes(self) -> dict[int, Cell]:
         """Return the values that differ from those at the previous call."""
-        if not self._told:
+        if not self._received:
             return {}
         shown = self._shown
-        changed = {index: value for index, value in self._told.items() if value != shown.get(index)}
+        changed = {index: value for index, value in self._received.items() if value != shown.get(index)}
         shown.update(changed)
-        self._told.clear()
+        self._received.clear()
         return changed
 
 
@@ -306,4 +306,4 @@ def variables_of(bag: Path, table: VariableTable) -> dict[str, Variable]:
         raise BagError("AMX6813", bag, f"the table of variables is wrong: {error}", _WRONG_TABLE_HINT) from error
 
 
-_WRONG_TABLE_HINT = "no rack has sent it so; what it numbers cannot be told apart"
+_WRONG_TABLE_HINT = "no rack has sent it so; its ids are ambiguous"

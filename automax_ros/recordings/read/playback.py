@@ -203,7 +203,7 @@ def _new_topic(channel: Channel, schema: Schema | None) -> PlayTopic:
     if channel.message_encoding != "cdr":
         topic.fault = f"its messages are in {channel.message_encoding[:40]!r}, not in CDR"
     elif schema is None or len(type_name) > _MAX_TOPIC:
-        topic.fault = "its type is not told"
+        topic.fault = "its type is unknown"
     elif type_name in message_types() and not is_known(schema):
         topic.fault = f"{type_name} was recorded with another definition"
     return topic

@@ -137,7 +137,7 @@ class BagReader:
         information = self._information
         if information is None:
             try:
-                information = next(filter(None, map(told_information, self.metadata_records())), {})
+                information = next(filter(None, map(recorded_information, self.metadata_records())), {})
             except BagError:  # raised again when the messages are read
                 information = {}
         return custom_data_of(information)
@@ -156,7 +156,7 @@ class BagReader:
             BagError: the recording is truncated, damaged or beyond the limits, its files do not follow each other in
                 time, or a message to be returned has an unknown type or one that was recorded with another definition.
         """
-        records = self._sourced()
+        records = self._read_with_sources()
         for source, record in records if self.is_ours else in_sent_order(records):
             self.last_stamp = record.publish_time
             channel = source.channel(record, types, topics)
@@ -169,9 +169,9 @@ class BagReader:
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits, or its files overlap in time.
         """
-        return (record for _, record in self._sourced())
+        return (record for _, record in self._read_with_sources())
 
-    def _sourced(self) -> Iterator[tuple[DataSource, RawMessage]]:
+    def _read_with_sources(self) -> Iterator[tuple[DataSource, RawMessage]]:
         """Yield the messages as stored in the files, each with its file."""
         total = sum(size_of(file) for file in self.files)
         before = 0
@@ -356,7 +356,7 @@ def read_information(folder: Path) -> dict[str, Any]:
     return information
 
 
-def told_information(record: Metadata) -> dict[str, Any] | None:
+def recorded_information(record: Metadata) -> dict[str, Any] | None:
     """Return a data file's copy of metadata.yaml; None if the record is another one or cannot be read."""
     text = record.metadata.get("serialized_metadata", "") if record.name == "rosbag2" else ""
     if not text or len(text) > MAX_METADATA_BYTES:

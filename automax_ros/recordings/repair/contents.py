@@ -20,7 +20,7 @@ from automax_ros.messages.cdr.message_headers import scan_head, write_head
 from automax_ros.messages.types.rack_files import RACK_FILE, RackFile, fingerprint
 from automax_ros.recordings.mcap.channels import is_known
 from automax_ros.recordings.mcap.metadata import FileSummary, TopicSummary
-from automax_ros.recordings.read.reader import custom_data_of, told_information
+from automax_ros.recordings.read.reader import custom_data_of, recorded_information
 from automax_ros.recordings.read.tally import Tally
 
 _MAX_FILES = 200
@@ -31,14 +31,14 @@ class Provenance:
     """Collects provenance from the files of a recording, and returns it as ``custom_data`` for metadata.yaml."""
 
     def __init__(self) -> None:
-        self._told: dict[str, str] = {}
+        self._recorded: dict[str, str] = {}
         self._files: dict[str, RackFile] = {}
         self._bytes = 0
 
     def take(self, record: Attachment | Metadata) -> None:
         """Read an attachment or metadata record of a data file."""
         if isinstance(record, Metadata):
-            information = None if self._told else told_information(record)
+            information = None if self._recorded else recorded_information(record)
             if information is not None:
                 self.take_information(information)
         elif record.name not in self._files and (record.name == RACK_FILE or record.name.endswith((".BLK", ".BAS"))):
@@ -48,12 +48,12 @@ class Provenance:
 
     def take_information(self, information: Mapping[str, Any]) -> None:
         """Read the contents of a readable metadata.yaml, or of its copy in a data file."""
-        self._told = custom_data_of(information) or self._told
+        self._recorded = custom_data_of(information) or self._recorded
 
     def custom_data(self, rack: str) -> dict[str, str]:
         """Return the custom data that were read, else those that follow from the files and the rack's name."""
-        if self._told or not rack:
-            return dict(self._told)
+        if self._recorded or not rack:
+            return dict(self._recorded)
         return {"rack": rack, "fingerprint": f"{fingerprint(list(self._files.values())):016x}"}
 
 
@@ -74,12 +74,12 @@ class FileSequence:
     def fault(self, log_time: int, type_name: str, payload: bytes) -> str:
         """Return why a message does not follow those before it; empty if it does, and then the next must follow it."""
         if log_time <= self._last_log:
-            return "log times that go backwards" if log_time < self._last_log else "log times that stand twice"
+            return "log times that go backwards" if log_time < self._last_log else "log times that are repeated"
         if type_name == WRITE:
             with contextlib.suppress(CdrError):
                 head = write_head(payload)
                 if head.sequence <= self._writes.get(head.run_id, -1):
-                    return "numbers of writes that go backwards or stand twice"
+                    return "numbers of writes that go backwards or are repeated"
                 if head.run_id in self._writes or len(self._writes) < _MOST_RUNS:
                     self._writes[head.run_id] = head.sequence
         self._last_log = log_time

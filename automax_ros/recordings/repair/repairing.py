@@ -24,7 +24,7 @@ from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.repair.contents import FileContents, FileSequence, Provenance, topics_of
 from automax_ros.recordings.repair.rewriting import RepairWriter
 
-_MISSING_TOLD = 20
+_MISSING_SHOWN = 20
 _GAP_NS = NS_PER_S
 """Longest time between two files of one recording; a longer one is reported as a gap."""
 
@@ -79,15 +79,18 @@ class RepairReport:
     def run_start(self) -> int:
         """The stamp of the start of the run, or of the first message without a VariableTable."""
         filled = [file.contents for file in self.files if file.contents.messages]
-        told = [item.run_start for item in filled if item.run_start is not None]
-        return told[0] if told else min((item.began for item in filled), default=0)
+        starts = [item.run_start for item in filled if item.run_start is not None]
+        return starts[0] if starts else min((item.began for item in filled), default=0)
 
 
-def repair(bag: Path, output: Path | None = None, tell: Callable[[float], None] = lambda _: None) -> RepairReport:
+def repair(
+    bag: Path, output: Path | None = None, on_progress: Callable[[float], None] = lambda _: None
+) -> RepairReport:
     """Check a recording, a folder or one .mcap file, and write a repaired one unless it is sound.
 
     ``output`` is the folder to write, ``<BAG>_repaired`` by default; if it is given, a sound recording is copied. The
-    default for one file of a recording's folder is next to that folder. ``tell`` is called with the share that is done.
+    default for one file of a recording's folder is next to that folder. ``on_progress`` is called with the share that
+    is done.
 
     Raises:
         BagError: there is no recording, or nothing in it can be used.
@@ -101,15 +104,15 @@ def repair(bag: Path, output: Path | None = None, tell: Callable[[float], None] 
     found: dict[Path, FileReport] = {}
     sequence = FileSequence() if _is_ours(bag, paths) else None
     for path in paths if sequence is None else sorted(paths, key=_first_log):
-        found[path] = _examined(path, provenance, sequence)
-        tell(len(found) / len(paths) / 2)
+        found[path] = _examine(path, provenance, sequence)
+        on_progress(len(found) / len(paths) / 2)
     report.files += [found[path] for path in paths]
     _check_metadata(bag, report, provenance)
     if report.sound and output is None:
         report.left = verdict_of(BagReader(bag)).fault
         return report
     was_sound = report.sound
-    _write(target, paths, report, provenance, tell)
+    _write(target, paths, report, provenance, on_progress)
     if not was_sound:
         _check_gaps(report)
     report.output = target
@@ -163,12 +166,12 @@ def _data_files(bag: Path, report: RepairReport) -> list[Path]:
     except BagError:
         listed = None
     names = [path.name for path in found]
-    wanted = [str(name)[:80] for name in listed[:MAX_FILES]] if isinstance(listed, list) else _numbered(found)
-    report.problems += [f"{name} is missing" for name in wanted if name not in names][:_MISSING_TOLD]
+    wanted = [str(name)[:80] for name in listed[:MAX_FILES]] if isinstance(listed, list) else _missing_numbers(found)
+    report.problems += [f"{name} is missing" for name in wanted if name not in names][:_MISSING_SHOWN]
     return found
 
 
-def _numbered(found: list[Path]) -> list[str]:
+def _missing_numbers(found: list[Path]) -> list[str]:
     """Return the names that are missing in the numbering of a recording's files, up to the last one found."""
     stem, last, _ = file_place(found[-1])
     numbers = {file_place(path)[1] for path in found if file_place(path)[0] == stem}
@@ -197,7 +200,7 @@ def _first_log(path: Path) -> int:
         return 0
 
 
-def _examined(path: Path, provenance: Provenance, sequence: FileSequence | None) -> FileReport:
+def _examine(path: Path, provenance: Provenance, sequence: FileSequence | None) -> FileReport:
     """Read a file to its end and report its damage; a damaged one is rewritten later."""
     file = McapFile(path)
     contents = FileContents(path.name, channels=file.channels, schemas=file.schemas)
@@ -276,7 +279,7 @@ def _check_gaps(report: RepairReport) -> None:
 
 
 def _write(
-    target: Path, paths: list[Path], report: RepairReport, provenance: Provenance, tell: Callable[[float], None]
+    target: Path, paths: list[Path], report: RepairReport, provenance: Provenance, on_progress: Callable[[float], None]
 ) -> None:
     """Write the repaired recording; remove it if that fails."""
     try:
@@ -286,14 +289,14 @@ def _write(
             "AMX6800", target, "exists already, not overwriting", "name another folder with --output"
         ) from None
     except OSError as error:
-        raise _refused(target, error) from error
+        raise _write_error(target, error) from error
     try:
         for number, (path, file) in enumerate(zip(paths, report.files, strict=True)):
             if file.sound:
                 shutil.copyfile(path, target / path.name)
             else:
                 _save(path, target / path.name, file, provenance)
-            tell(0.5 + (number + 1) / len(paths) / 2)
+            on_progress(0.5 + (number + 1) / len(paths) / 2)
         kept = _in_time([file for file in report.files if file.usable])
         if not kept:
             raise _nothing(report)
@@ -304,7 +307,7 @@ def _write(
     except BaseException as error:
         shutil.rmtree(target, ignore_errors=True)
         if isinstance(error, OSError):
-            raise _refused(target, error) from error
+            raise _write_error(target, error) from error
         raise
 
 
@@ -355,7 +358,7 @@ def _write_metadata(target: Path, kept: list[FileReport], report: RepairReport, 
     (target / METADATA_FILE).write_bytes(text)
 
 
-def _refused(target: Path, error: OSError) -> RecordingError:
+def _write_error(target: Path, error: OSError) -> RecordingError:
     return RecordingError(
         "AMX6801",
         target,

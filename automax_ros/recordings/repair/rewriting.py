@@ -117,7 +117,7 @@ class RepairWriter:
             if piece.name != "rosbag2":
                 self._output.add_metadata(piece)
         else:
-            self._add(self._chosen([_found(piece)]))
+            self._add(self._choose([_make_found(piece)]))
             if self._loose.size > _LOOSE_BYTES:
                 self._end_loose()
 
@@ -136,14 +136,14 @@ class RepairWriter:
                     whole = whole and record is not None
                     inner |= {(type(record), record.id)} if record is not None else set()
                 elif len(content) >= MESSAGE_FIELDS.size:
-                    message = _found(content)
+                    message = _make_found(content)
                     found.append(message)
                     index.setdefault(message.channel, []).extend((message.log_time, start - RECORD_HEAD.size))
                 else:
                     whole = False
         keep = kept(found, self.contents.type_of, cut=piece.cut) if last or piece.cut else len(found)
         self._drop(found[keep:])
-        chosen = self._chosen(found[:keep])
+        chosen = self._choose(found[:keep])
         if piece.packed is None or not whole or len(chosen) < len(found) or end < len(data):
             self._end_loose()
             self._add(chosen)
@@ -153,7 +153,7 @@ class RepairWriter:
             self._output.add_packed_chunk(piece.packed, ChunkBuilder(index))
             self._count(found)
 
-    def _chosen(self, messages: Sequence[Found]) -> list[Found]:
+    def _choose(self, messages: Sequence[Found]) -> list[Found]:
         """Return the messages that can be decoded and follow each other; count the others as dropped."""
         places = [self._is_usable(message) for message in messages]
         self._drop([message for message, usable in zip(messages, places, strict=True) if not usable])
@@ -234,6 +234,6 @@ def _lacks_writes(messages: Sequence[Found], type_of: Callable[[int], str]) -> b
     return missing > 0
 
 
-def _found(content: bytes) -> Found:
+def _make_found(content: bytes) -> Found:
     channel, sequence, log_time, stamp = MESSAGE_FIELDS.unpack_from(content)
     return Found(channel, sequence, log_time, stamp, content[MESSAGE_FIELDS.size :])

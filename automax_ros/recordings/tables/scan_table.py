@@ -88,12 +88,12 @@ class ScanTable:
             last, scan = time, message
             if before is not None and scan.scan > before + 1 and not scan.full:
                 held.update((index, None) for index in self._inputs.values())
-            told = self._told(scan)
-            known.update(told)
+            cells = self._recorded_cells(scan)
+            known.update(cells)
             for key, index in self._outputs.items():
                 if index not in known and (value := known.get(self._inputs.get(key, -1))) is not None:
-                    known[index] = told[index] = value
-            held.update(told)
+                    known[index] = cells[index] = value
+            held.update(cells)
             before = scan.scan
             row = last if scan.scan and last >= self._window.start_ns else None
             if row is not None:
@@ -105,24 +105,24 @@ class ScanTable:
             hint = f"the last one in reach is at {seconds_text(last)} s"
             raise BagError("AMX6825", self._bag, f"holds no scan of {self._task} in the range asked for", hint)
 
-    def _told(self, scan: Scan) -> dict[int, Cell | None]:
+    def _recorded_cells(self, scan: Scan) -> dict[int, Cell | None]:
         """Return the inputs and outputs in a scan's message, by column."""
         log, stamp = self._log, scan.stamp
-        told: dict[int, Cell | None] = {}
+        cells: dict[int, Cell | None] = {}
         own: set[Key] = set()
         for entry in log.entries(scan.latched, stamp):
-            told[self._inputs[entry[:2]]] = entry[2]
+            cells[self._inputs[entry[:2]]] = entry[2]
         for entry in log.reads(scan.read, stamp):  # the first read counts: a later one may see the scan's own write
             index = self._inputs.get(entry[:2])
             if index is not None and entry[:2] not in own:
                 own.add(entry[:2])
-                told.setdefault(index, entry[2])
+                cells.setdefault(index, entry[2])
         for values in (scan.written, scan.committed):
             for entry in log.reads(values, stamp):
                 index = self._outputs.get(entry[:2])
                 if index is not None:
-                    told[index] = entry[2]
-        return told
+                    cells[index] = entry[2]
+        return cells
 
     def _local_cells(self, state: TaskState) -> dict[int, Cell | None]:
         if state.layout_hash != self._layout:
@@ -166,8 +166,8 @@ class ScanTable:
             for keys, values in ((inputs, message.latched), (outputs, message.committed)):
                 keys.update(dict.fromkeys(zip(values.variable, values.element, strict=False)))
             for keys, values in ((inputs, message.read), (outputs, message.written)):
-                told = zip(values.variable, values.element, strict=False)
-                keys.update(dict.fromkeys(key for key in told if key[0] in self._variables))
+                places = zip(values.variable, values.element, strict=False)
+                keys.update(dict.fromkeys(key for key in places if key[0] in self._variables))
         self._inputs = self._add("in", inputs)
         self._outputs = self._add("out", outputs)
         if first is not None and states >= scans:

@@ -99,7 +99,7 @@ class Series:
         self._log = CommonLog(bag, run_facts(self._reader))
         table, variables = self._log.facts.table, self._log.variables
         self._states = WatchedStates(bag)
-        self.columns: tuple[Watched, ...] = tuple(self._watched(variables, watch))
+        self.columns: tuple[Watched, ...] = tuple(self._find_watched(variables, watch))
         self.rack = table.rack
         self.origin_ns = table.stamp
         self.end_ns = 0
@@ -128,7 +128,7 @@ class Series:
             start = seconds_text(self._window.start_ns)
             raise BagError("AMX6825", self._bag, f"holds no value from {start} s on, in the range asked for", last)
 
-    def _watched(self, variables: dict[str, Variable], watch: Sequence[str] | None) -> list[Watched]:
+    def _find_watched(self, variables: dict[str, Variable], watch: Sequence[str] | None) -> list[Watched]:
         if watch is None:
             return watched_by_default(variables)
         watched: dict[str, Watched] = {}
@@ -148,10 +148,10 @@ class Series:
         values, instant = self._values, self.origin_ns
         for entry in self._messages:
             message = entry.message
-            told: Iterable[tuple[int, Cell]] = ()
+            states: Iterable[tuple[int, Cell]] = ()
             entries: Iterable[Entry] | None = ()
             if isinstance(message, (TaskState, PlantState)):
-                told = self._states.values(message)
+                states = self._states.values(message)
             elif isinstance(message, (CommonImage, CommonWrite)):
                 entries = self._log.take(message)
                 if self._take_writes is not None and entries and isinstance(message, CommonWrite):
@@ -166,8 +166,8 @@ class Series:
                 if changed:
                     yield max(0, instant - self.origin_ns), changed
                 instant = message.stamp
-            for column, value in told:
-                values.tell(column, value)
+            for column, value in states:
+                values.set_value(column, value)
             values.take(entries)
         changed = values.changes()
         if changed:
@@ -233,13 +233,13 @@ class Series:
             if due is None:
                 due = self._window.start_ns + -(-(time - self._window.start_ns) // step) * step
             while due < time:
-                rows = self._counted(rows)
+                rows = self._count(rows)
                 yield due, held
                 held = {}
                 due += step
             held.update(changed)
         while due is not None and due <= self.end_ns:
-            rows = self._counted(rows)
+            rows = self._count(rows)
             yield due, held
             held = {}
             due += step
@@ -261,7 +261,7 @@ class Series:
         if rows > MAX_GRID_ROWS:
             raise self._too_many(f"would make a table of {rows} rows on that grid, at most {MAX_GRID_ROWS}")
 
-    def _counted(self, rows: int) -> int:
+    def _count(self, rows: int) -> int:
         if rows >= MAX_GRID_ROWS:
             raise self._too_many(f"has more than {MAX_GRID_ROWS} rows on that grid")
         return rows + 1

@@ -109,7 +109,10 @@ class WatchedStates:
         elif state.task in self._locals:
             known = self._places.get(state.task)
             if known is None or known[0] != state.layout_hash:
-                known = self._places[state.task] = (state.layout_hash, self._found(state, self._locals[state.task]))
+                known = self._places[state.task] = (
+                    state.layout_hash,
+                    self._find_places(state, self._locals[state.task]),
+                )
             for column, place in known[1]:
                 if place >= len(state.value):
                     raise BagError("AMX6813", self._bag, f"a state of {state.task} lacks values")
@@ -130,7 +133,7 @@ class WatchedStates:
             hint = f"it holds those of {', '.join(seen[:8])}" if seen else ""
             raise BagError(code, self._bag, f"holds no states of a {kind} {missing[0][:40]!r}", hint)
 
-    def _found(self, state: TaskState, asked: Sequence[tuple[int, str, int]]) -> list[tuple[int, int]]:
+    def _find_places(self, state: TaskState, asked: Sequence[tuple[int, str, int]]) -> list[tuple[int, int]]:
         """Return the column and the place in a state's values of each requested field."""
         fields: dict[str, tuple[int, int]] = {}
         place = 0

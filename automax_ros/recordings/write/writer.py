@@ -196,7 +196,7 @@ class BagWriter:
             self._chunks.settle()
             self._mcap.add_attachment(attachment)
         except OSError as error:
-            raise self._failed(error) from error
+            raise self._failure_error(error) from error
 
     @property
     def split_due(self) -> bool:
@@ -215,7 +215,7 @@ class BagWriter:
             self._finish_file()
             self._begin_file()
         except OSError as error:
-            raise self._failed(error) from error
+            raise self._failure_error(error) from error
 
     def flush(self, now: int | None = None) -> None:
         """Hand the open chunk to the operating system; with a time, only if the chunk's own time has passed by then.
@@ -248,7 +248,7 @@ class BagWriter:
             RecordingError: a ``sync`` has failed.
         """
         if self._sync_error is not None:
-            raise self._failed(self._sync_error)
+            raise self._failure_error(self._sync_error)
 
     def close(self) -> None:
         """Finish the files. After a failed write only data already on the disk are kept.
@@ -266,7 +266,7 @@ class BagWriter:
             (self.folder / METADATA_FILE).write_text(text, encoding="utf-8", newline="\n")
             self._finished += [self.folder / METADATA_FILE, self.folder]
         except OSError as error:
-            raise self._failed(error) from error
+            raise self._failure_error(error) from error
         self.require_synced()
 
     def _begin_file(self) -> None:
@@ -312,7 +312,7 @@ class BagWriter:
         if not self._open or not 0 <= stamp <= MAX_STAMP:
             raise self._bad_message(channel, stamp, payload)
         if self._sync_error is not None:
-            raise self._failed(self._sync_error)
+            raise self._failure_error(self._sync_error)
         time = self._last_time + 1
         time = max(time, stamp)
         if time >= self._chunk_end or self._chunk.size > CHUNK_BYTES:
@@ -325,7 +325,7 @@ class BagWriter:
         try:
             self._end_chunk(wait=wait)
         except OSError as error:
-            raise self._failed(error) from error
+            raise self._failure_error(error) from error
 
     def _end_chunk(self, *, wait: bool) -> None:
         """Write the open chunk; ``wait`` until that is done if the file's size is needed next, or the file itself."""
@@ -363,7 +363,7 @@ class BagWriter:
     def _refusal(self, message: str) -> RecordingError:
         return RecordingError("AMX6802", self.folder, message)
 
-    def _failed(self, error: OSError) -> RecordingError:
+    def _failure_error(self, error: OSError) -> RecordingError:
         self._open, self._stamp = False, None
         self._chunks.end()
         with contextlib.suppress(OSError):

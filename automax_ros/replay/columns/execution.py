@@ -67,7 +67,7 @@ class PythonColumns:
             # The scan that could not be executed has changed the state: execute the scans before it again.
             state[:] = before
             io = self._execute(state, latched, io.done, read)
-        return self._executed(io, latched)
+        return self._build_executed(io, latched)
 
     def _execute(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> _ColumnIo:
         columns = [
@@ -92,7 +92,7 @@ class PythonColumns:
         io.end()
         return io
 
-    def _executed(self, io: _ColumnIo, latched: Sequence[Ints]) -> Executed:
+    def _build_executed(self, io: _ColumnIo, latched: Sequence[Ints]) -> Executed:
         done = io.done
         position = {self._views[place]: number for number, place in enumerate(self._outputs)}
         outputs = [latched[place][:done].copy() for place in self._outputs]
@@ -116,7 +116,9 @@ class _ColumnIo:
         self._types, self._backplane = types, backplane
         self._read, self._place, self._end = read, 0, 0
         self._places = list(zip(read.views.tolist(), read.elements.tolist(), strict=True))
-        self._values = [_typed(types[view], value) for (view, _), value in zip(self._places, read.values, strict=True)]
+        self._values = [
+            _convert(types[view], value) for (view, _), value in zip(self._places, read.values, strict=True)
+        ]
         self._offsets = read.offsets.tolist()
         self.done = 0
         self._scan = -1
@@ -212,7 +214,7 @@ class _ColumnIo:
         raise _Elsewhere
 
 
-def _typed(kind: DataType, value: float) -> Value:
+def _convert(kind: DataType, value: float) -> Value:
     if kind is DataType.REAL:
         return float(value)
     return bool(value) if kind is DataType.BOOLEAN else int(value)

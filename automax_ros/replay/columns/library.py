@@ -222,8 +222,10 @@ class ColumnLibrary:
         if found <= 0:
             return None
         numbers, places, lengths, log_times, stamps = columns[:, :found].copy()
-        told = tuple(definition_at(data, place) for place in definitions[: defined.value].tolist())
-        return ChunkTable(numbers, places, lengths, log_times.view(np.uint64), stamps.view(np.uint64), told)
+        found_definitions = tuple(definition_at(data, place) for place in definitions[: defined.value].tolist())
+        return ChunkTable(
+            numbers, places, lengths, log_times.view(np.uint64), stamps.view(np.uint64), found_definitions
+        )
 
     def taken(
         self, kind: TakenKind, data: Bytes, starts: Ints, lengths: Ints, rules: ValueRules, texts: Sequence[str] = ()

@@ -97,7 +97,7 @@ def scans_by_task(
     taken = library.taken(SCANS, block.data, block.starts[places], block.lengths[places], rules, tasks)
     named, odd = taken.named, taken.odd | taken.with_texts | (taken.numbers["scan"] < 0)
     for row in taken.malformed.tolist():
-        scan = _decoded(block, int(places[row]))
+        scan = _decode(block, int(places[row]))
         if scan is None:
             odd[row:] = True  # a replay ends at the first malformed message
             break
@@ -128,7 +128,7 @@ def write_columns(
     entries = library.picked(taken, np.arange(len(places)))[0]
     sequences, kinds, runs = taken.numbers.values()
     for row in taken.malformed.tolist():
-        write = _decoded(block, int(places[row]))
+        write = _decode(block, int(places[row]))
         if write is None:
             break  # a replay ends at the first malformed message
         kinds[row] = write.kind
@@ -139,7 +139,7 @@ def write_columns(
     return WriteColumns(places, sequences, entries, good), places[forcing]
 
 
-def _decoded(block: MessageBlock, place: int) -> Any:
+def _decode(block: MessageBlock, place: int) -> Any:
     """Return a message that only the scalar decoder can check; None if it is malformed."""
     try:
         return block.message(place).message

@@ -62,12 +62,12 @@ class BlockReplay:
         part = _BlockPart(block, self._names, self._commons.facts.table.run_id, self._rules, self._library)
         begin = 0
         for place in part.by_themselves(self._end):
-            if not self._between(part, begin, place) or not self._take(block.message(place)):
+            if not self._process_between(part, begin, place) or not self._take(block.message(place)):
                 return False
             begin = place + 1
-        return self._between(part, begin, len(block))
+        return self._process_between(part, begin, len(block))
 
-    def _between(self, part: _BlockPart, begin: int, end: int) -> bool:
+    def _process_between(self, part: _BlockPart, begin: int, end: int) -> bool:
         """Process the messages between two that must be processed separately."""
         if end - begin < FEWEST_MESSAGES:
             return self._one_by_one(part, range(begin, end))
@@ -75,7 +75,7 @@ class BlockReplay:
         for name in self._tasks:
             scans = part.scans_between(name, begin, end)
             if scans is not None:
-                left += scans.places[self._taken(name, scans) :].tolist()
+                left += scans.places[self._replay_columns(name, scans) :].tolist()
         position = begin
         for place in sorted(left):
             if not self._writes(part, position, place) or not self._take(part.block.message(place)):
@@ -83,7 +83,7 @@ class BlockReplay:
             position = place + 1
         return self._writes(part, position, end)
 
-    def _taken(self, name: str, scans: ScanColumns) -> int:
+    def _replay_columns(self, name: str, scans: ScanColumns) -> int:
         """Replay scans of a task by columns up to the first odd one, and never the last; return how many."""
         counted = scans.stamps >= self._begin
         alike = (counted == counted[0]) & ~scans.odd

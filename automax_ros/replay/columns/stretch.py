@@ -92,7 +92,7 @@ class TaskStretches:
         state = form.task.state
         before = [value[:] if isinstance(value, list) else value for value in state]
         executed = form.columns.columns(state, list(latched), len(scans), scans.read)
-        same = self._same(scans, executed, latched, form)
+        same = self._count_equal(scans, executed, latched, form)
         if same < executed.done:
             state[:] = before
             executed = form.columns.columns(state, list(latched), same, scans.read.part(0, same))
@@ -140,7 +140,7 @@ class TaskStretches:
         count = len(scans) if following.all() else int(np.argmin(following))
         return min(count, form.latched.whole(scans))
 
-    def _same(self, scans: ScanColumns, executed: Executed, latched: Ints, form: _Form) -> int:
+    def _count_equal(self, scans: ScanColumns, executed: Executed, latched: Ints, form: _Form) -> int:
         """Return how many scans have the recorded results."""
         done = executed.done
         if not done:

@@ -88,13 +88,13 @@ class _Reader:
         for time_ns, changed in series.changes():
             time_s = time_ns / NS_PER_S
             self._start_s = time_s if self._start_s is None else self._start_s
-            told: dict[int, tuple[DriveRun, dict[str, float]]] = {}
+            by_run: dict[int, tuple[DriveRun, dict[str, float]]] = {}
             for column, value in changed.items():
                 if isinstance(value, str):
                     continue
                 for run, keyword in of_column[column]:
-                    told.setdefault(id(run), (run, {}))[1][keyword] = float(value)
-            for run, values in told.values():
+                    by_run.setdefault(id(run), (run, {}))[1][keyword] = float(value)
+            for run, values in by_run.values():
                 run.take(time_s, values)
         self._end_s = series.end_ns / NS_PER_S
 
@@ -103,7 +103,7 @@ class _Reader:
             if scan.errors and scan.task == run.drive.task:
                 marks.take(time_ns, scan)
                 for error in scan.errors:
-                    run.tell(time_ns / NS_PER_S, "error", error_text(error.code, error.line))
+                    run.add_event(time_ns / NS_PER_S, "error", error_text(error.code, error.line))
 
     def read_plants(self, progress: Progress | None) -> None:
         """Read the plants of all drives, and the operations on the rack."""
@@ -119,7 +119,7 @@ class _Reader:
             time_s = time_ns / NS_PER_S
             if isinstance(message, Operation):
                 for run, _ in self._found if (text := operation_text(message)) else ():
-                    run.tell(time_s, "operation", text)
+                    run.add_event(time_s, "operation", text)
             elif message.plant in runs:
                 runs[message.plant].take_plant(time_s, message)
                 self._start_s = time_s if self._start_s is None else min(self._start_s, time_s)

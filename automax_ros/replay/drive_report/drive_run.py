@@ -126,14 +126,14 @@ class DriveRun:
         elif keyword == SUSPECT and value != before and on:
             number = int(value)
             suspects = f"{number} or {PARTNER[number]}" if number in FORWARD else f"{number}"
-            self.tell(time_s, "fault", f"suspected shorted SCR: {suspects} ({signal.variable})")
+            self.add_event(time_s, "fault", f"suspected shorted SCR: {suspects} ({signal.variable})")
             return
         if before is None or (before != 0.0) == on:
             return
         if keyword in STATES:
             text = STATES[keyword][0 if on else 1]
             if text:
-                self.tell(time_s, "state", f"{text} ({signal.variable})")
+                self.add_event(time_s, "state", f"{text} ({signal.variable})")
         if keyword == "DC_CML_STATE":
             self.starts += on
         elif keyword == "BRIDGE_POL":
@@ -145,12 +145,12 @@ class DriveRun:
         if on and keyword not in self._begun:
             self._begun[keyword] = time_s
             self.fault_count += 1
-            self.tell(time_s, "fault", f"fault: {what} ({keyword} {signal.variable})")
+            self.add_event(time_s, "fault", f"fault: {what} ({keyword} {signal.variable})")
         elif not on and keyword in self._begun:
             span = FaultSpan(keyword, signal.variable, what, self._begun.pop(keyword), time_s)
             if len(self.faults) < MOST_EVENTS:
                 self.faults.append(span)
-            self.tell(time_s, "fault", f"no fault any more: {what} ({keyword} {signal.variable})")
+            self.add_event(time_s, "fault", f"no fault any more: {what} ({keyword} {signal.variable})")
 
     def _draw(self, time_s: float, signal: Signal) -> None:
         keyword = signal.keyword
@@ -216,15 +216,15 @@ class DriveRun:
 
     def _note_plant(self, time_s: float, message: PlantState) -> None:
         if self._contactor is not None and message.contactor != self._contactor:
-            self.tell(time_s, "plant", "the contactor is closed" if message.contactor else "the contactor is open")
+            self.add_event(time_s, "plant", "the contactor is closed" if message.contactor else "the contactor is open")
         self._contactor = message.contactor
         broken = tuple(message.faults[:MOST_BROKEN])
         for name in broken:
             if name not in self._broken:
-                self.tell(time_s, "plant", f"the plant has {name}")
+                self.add_event(time_s, "plant", f"the plant has {name}")
         for name in self._broken:
             if name not in broken:
-                self.tell(time_s, "plant", f"the plant has {name} no longer")
+                self.add_event(time_s, "plant", f"the plant has {name} no longer")
         self._broken = broken
 
     @property
@@ -233,13 +233,13 @@ class DriveRun:
         return self.happened.events
 
     @property
-    def untold(self) -> int:
+    def omitted(self) -> int:
         """Number of events that are not kept."""
-        return self.happened.untold
+        return self.happened.omitted
 
-    def tell(self, time_s: float, kind: str, text: str) -> None:
+    def add_event(self, time_s: float, kind: str, text: str) -> None:
         """Add an event."""
-        self.happened.tell(time_s, kind, text)
+        self.happened.add_event(time_s, kind, text)
 
     def finish(self, end_s: float) -> None:
         """End the run: the last values hold to the end."""

@@ -49,9 +49,9 @@ class ValuesSet:
 
     def __init__(self) -> None:
         self._open: dict[str, _Written] = {}
-        self._told: list[tuple[int, str]] = []
+        self._ended: list[tuple[int, str]] = []
         self._values: dict[str, Cell] = {}
-        self.untold = 0
+        self.omitted = 0
 
     def take(self, time_ns: int, writer: WriterKind, values: Sequence[tuple[str, Cell]]) -> None:
         """Add a write; a value that ROS repeats is added once."""
@@ -63,50 +63,50 @@ class ValuesSet:
             if before is not None and before.writer is writer and time_ns - before.end_ns < TOGETHER_NS:
                 before.end_ns, before.last, before.more = time_ns, value, before.more + 1
                 continue
-            self._tell(name)
+            self._end(name)
             self._open[name] = _Written(time_ns, writer, value, time_ns, value)
 
     def events(self) -> list[Event]:
         """Return all writes as events, in the order of time."""
         for name in list(self._open):
-            self._tell(name)
-        told = sorted(self._told, key=lambda item: item[0])
-        return [Event(time_ns / NS_PER_S, "operation", cut(text)) for time_ns, text in told]
+            self._end(name)
+        ended = sorted(self._ended, key=lambda item: item[0])
+        return [Event(time_ns / NS_PER_S, "operation", cut(text)) for time_ns, text in ended]
 
-    def _tell(self, name: str) -> None:
+    def _end(self, name: str) -> None:
         written = self._open.pop(name, None)
         if written is None:
             return
-        if len(self._told) >= MOST_EVENTS:
-            self.untold += 1
+        if len(self._ended) >= MOST_EVENTS:
+            self.omitted += 1
             return
         text = f"{_WHO[written.writer]} {name} = {source_text(written.first)}"
         if written.more:
             end = seconds_text(written.end_ns)
             text += f", then {written.more} more values to {source_text(written.last)} at {end} s"
-        self._told.append((written.begin_ns, text))
+        self._ended.append((written.begin_ns, text))
 
 
 @dataclass
 class Happenings:
-    """Collects the events of a run, at most ``MOST_EVENTS`` of a kind; ``untold`` counts the rest."""
+    """Collects the events of a run, at most ``MOST_EVENTS`` of a kind; ``omitted`` counts the rest."""
 
     events: list[Event] = field(default_factory=list)
-    untold: int = 0
-    _told: Counter[str] = field(default_factory=Counter)
+    omitted: int = 0
+    _counts: Counter[str] = field(default_factory=Counter)
 
-    def tell(self, time_s: float, kind: str, text: str) -> None:
+    def add_event(self, time_s: float, kind: str, text: str) -> None:
         """Add an event."""
-        self._told[kind] += 1
-        if self._told[kind] <= MOST_EVENTS:
+        self._counts[kind] += 1
+        if self._counts[kind] <= MOST_EVENTS:
             self.events.append(Event(time_s, kind, cut(text)))
         else:
-            self.untold += 1
+            self.omitted += 1
 
     def finish(self, values_set: ValuesSet) -> None:
         """Sort the events by time; at one instant, values that were set come first, for the rest follows from them."""
         self.events[:0] = values_set.events()
-        self.untold += values_set.untold
+        self.omitted += values_set.omitted
         self.events.sort(key=lambda event: event.time_s)
 
 

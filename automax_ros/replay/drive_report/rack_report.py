@@ -63,7 +63,7 @@ def rack_report(bag: Path, window: Window = WHOLE_RUN, progress: Progress | None
         scans[scan.task] += 1
         errors[scan.task] += len(scan.errors)
         for error in scan.errors:
-            happened.tell(time_ns / NS_PER_S, "error", f"{scan.task}: {error_text(error.code, error.line)}")
+            happened.add_event(time_ns / NS_PER_S, "error", f"{scan.task}: {error_text(error.code, error.line)}")
 
     half = None if progress is None else lambda share: progress(share / 2)
     shown = traces(bag, names, window, half, take_scan, values_set.take)
@@ -74,7 +74,7 @@ def rack_report(bag: Path, window: Window = WHOLE_RUN, progress: Progress | None
         assert isinstance(message, Operation)
         time_ns = message.stamp - facts.stamp
         if window.holds(time_ns) and (text := operation_text(message)):
-            happened.tell(time_ns / NS_PER_S, "operation", text)
+            happened.add_event(time_ns / NS_PER_S, "operation", text)
     happened.finish(values_set)
     tasks = []
     for module, task in stored.config.placed_tasks:

@@ -99,7 +99,7 @@ class ScanComparison:
         for number in range(max(len(writes), len(recorded))):
             one = recorded[number] if number < len(recorded) else None
             other = writes[number] if number < len(writes) else None
-            if one and other and one[:2] == other[:2] and self._same(one[2], other[2]):
+            if one and other and one[:2] == other[:2] and self._is_same(one[2], other[2]):
                 continue
             return [Found(Kind.WRITES, "writes", self._write_text(one), self._write_text(other))]
         return []
@@ -126,9 +126,9 @@ class ScanComparison:
         return [Found(Kind.COMMAND, name, recorded, own, counts) for name, recorded, own in self._memory.drive.other()]
 
     def _alike(self, recorded: Sequence[Value], own: Sequence[Value]) -> bool:
-        return len(recorded) == len(own) and all(map(self._same, recorded, own))
+        return len(recorded) == len(own) and all(map(self._is_same, recorded, own))
 
-    def _same(self, recorded: Value, own: Value) -> bool:
+    def _is_same(self, recorded: Value, own: Value) -> bool:
         return same_bits(recorded, own) or within(recorded, own, self._tolerance)
 
     def _other_errors(self, scan: Scan, record: ScanRecord) -> list[Found]:

@@ -25,7 +25,7 @@ CHANNELS = frozenset(CHANNEL_VIEWS.values())
 class RecordedChannels:
     """Channels on which each access has the outcome of the recorded burst's next access to that channel number.
 
-    After the last of those an edited task must wait (decision: what it would have received nobody knows).
+    After the last of those an edited task must wait (decision: what it would have received is unknown).
     """
 
     def __init__(self) -> None:
@@ -120,7 +120,7 @@ class ScanMemory:
         self._views: tuple[int, ...] = ()
         self._positions: dict[int, int] = {}
         self._recorded: list[Value] = []
-        self._untold: set[int] = set()
+        self._unrecorded: set[int] = set()
         self._in_step = False
         self._reads: list[Entry] = []
         self._read_count = 0
@@ -165,7 +165,7 @@ class ScanMemory:
 
     def forget_latch(self) -> None:
         """Forget the latched values, after scans that are missing."""
-        self._untold = set(range(len(self._views)))
+        self._unrecorded = set(range(len(self._views)))
 
     def follow(self, scan: Scan) -> None:
         """Apply the newly latched values of a scan; to be called for each scan, executed or not.
@@ -181,12 +181,12 @@ class ScanMemory:
             position = self._positions.get(view)
             if position is not None:
                 self._recorded[position] = value
-                self._untold.discard(position)
+                self._unrecorded.discard(position)
 
     @property
     def is_uniform(self) -> bool:
         """Whether the inputs of a scan are exactly the values that the recorded one latched and read."""
-        return not (self._untold or self.apart or self._before or self._forced)
+        return not (self._unrecorded or self.apart or self._before or self._forced)
 
     @property
     def latched_last(self) -> Sequence[Value]:
@@ -222,12 +222,12 @@ class ScanMemory:
 
     def latch(self, plan: LatchPlan) -> Latched:  # noqa: ARG002
         """Return the recorded latch, with this task's own values for variables that only it latches or has changed."""
-        if not self._untold and not self.apart:
+        if not self._unrecorded and not self.apart:
             return tuple(self._recorded)
         values = list(self._recorded)
-        for position in self._untold:
+        for position in self._unrecorded:
             if (self._views[position], 0) not in self.apart:
-                values[position] = self._told((self._views[position], 0))
+                values[position] = self._recorded_value((self._views[position], 0))
         for (view, _), value in self.apart.items():
             latched_at = self._positions.get(view)
             if latched_at is not None:
@@ -249,7 +249,7 @@ class ScanMemory:
             return self.apart[key]
         if self._in_step and key not in self._rewritten:
             return self._reads[number][2]
-        return self._told(key)
+        return self._recorded_value(key)
 
     def write_now(
         self,
@@ -294,7 +294,7 @@ class ScanMemory:
             elif key in self.apart:
                 own = self.apart[key]
             else:
-                own = self._told(key)
+                own = self._recorded_value(key)
             if same_bits(its, own):
                 self.apart.pop(key, None)
             else:
@@ -338,7 +338,7 @@ class ScanMemory:
         if self._edited and key not in self._before and self._commons.is_known(key):
             self._before[key] = self._commons.value(key)
 
-    def _told(self, key: Key) -> Value:
+    def _recorded_value(self, key: Key) -> Value:
         """Return the recorded value, without the writes that the recorded scan itself has made already."""
         return self._before[key] if key in self._before else self._commons.value(key)
 
@@ -380,7 +380,7 @@ class ScanMemory:
         key = (view, element)
         if key in self._own:
             return self._own[key]
-        return self.apart[key] if key in self.apart else self._told(key)
+        return self.apart[key] if key in self.apart else self._recorded_value(key)
 
     def _commits_agree(self, commits: Sequence[tuple[int, Value]]) -> bool:
         recorded = self._committed

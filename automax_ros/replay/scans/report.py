@@ -219,7 +219,7 @@ def _first_lines(first: FirstScan) -> Iterator[str]:
         if values_seen:
             shown = [f"{item.name}={source_text(item.value)}" for item in values_seen[:_LONGEST_LIST]]
             rest = len(values_seen) - len(shown)
-            yield from _wrapped(f"  it {title}: ", shown + ([f"and {rest} more"] if rest else []))
+            yield from _wrap(f"  it {title}: ", shown + ([f"and {rest} more"] if rest else []))
 
 
 _HEAD = ("task", "differs", "line", "first scan", "at s", "recorded", "replayed", "greatest", "in scan", "scans", "")
@@ -277,7 +277,7 @@ def _error_text(line: int, code: int) -> str:
     return f"line {line} AMX{code:04d}{title}" if line else f"AMX{code:04d}{title}"
 
 
-def _wrapped(title: str, parts: Sequence[str], width: int = 110) -> Iterator[str]:
+def _wrap(title: str, parts: Sequence[str], width: int = 110) -> Iterator[str]:
     """Yield the lines of ``title: a, b, c``, broken between parts."""
     line = title
     for number, part in enumerate(parts):

@@ -61,7 +61,7 @@ def whole_state(bag: Path, layout: Layout, state: TaskState) -> Takeover:
     recorded = [item for item in zip(state.field, state.size, strict=True) if not item[0].startswith(HELD_MARK)]
     if [(item.name, item.size) for item in layout.fields] != recorded:
         raise BagError("AMX6831", bag, f"the states of task {state.task[:40]} have other fields than the task")
-    return Takeover([value for field in layout.fields for value in _typed(bag, state, field, fields[field.name])], ())
+    return Takeover([value for field in layout.fields for value in _convert(bag, state, field, fields[field.name])], ())
 
 
 def fitting_state(
@@ -101,7 +101,7 @@ def _fitting(field: StateField, values: tuple[Value, ...] | None, old: StateFiel
         return None
 
 
-def _typed(bag: Path, state: TaskState, field: StateField, values: Sequence[Value]) -> Iterator[Value]:
+def _convert(bag: Path, state: TaskState, field: StateField, values: Sequence[Value]) -> Iterator[Value]:
     try:
         yield from [field.typed(value) for value in values]
     except (ValueError, OverflowError) as error:
@@ -155,7 +155,7 @@ def held_in(bag: Path, task: Task, state: TaskState) -> dict[str, Value]:
     found: dict[str, Value] = {}
     for name in names:
         if name in known and len(fields.get(name, ())) == 1 and known[name].type is not DataType.STRING:
-            found[name] = next(_typed(bag, state, known[name], fields[name]))
+            found[name] = next(_convert(bag, state, known[name], fields[name]))
     return found
 
 

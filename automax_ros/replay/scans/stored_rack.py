@@ -79,7 +79,7 @@ class ReplaySource:
         if before == after or not before or not after:
             return []
         periods = f"its scan period was {before / 1e6:g} ms and is {after / 1e6:g} ms now"
-        return [f"{periods}; it is executed at the recorded scans all the same"]
+        return [f"{periods}; it is executed at the recorded scans nevertheless"]
 
     @property
     def written_at(self) -> Mapping[str, tuple[int, ...]]:
@@ -131,7 +131,7 @@ class StoredRack:
             if source is None:
                 hint = f"give it with --task {name}=FILE, or leave the task out with --only"
                 raise BagError("AMX6830", self.bag, f"lacks the source of task {name}", hint)
-            result = self._checked(source, modules[name], name)
+            result = self._check(source, modules[name], name)
             if result.program is None or has_errors(result.diagnostics):
                 refused.append((source, result.diagnostics))
                 continue
@@ -140,9 +140,9 @@ class StoredRack:
             edited = stored is None or name in new
             recorded: CompiledTask | None = compiled
             if edited:
-                before = self._checked(stored, modules[name], name).program if stored else None
+                before = self._check(stored, modules[name], name).program if stored else None
                 recorded = compile_program(before, views) if before else None
-            later = [self._checked(text, modules[name], name).program for text in self.later.get(name, ())]
+            later = [self._check(text, modules[name], name).program for text in self.later.get(name, ())]
             ran = [*([recorded] if recorded else ()), *(compile_program(item, views) for item in later if item)]
             versions = {item.program.source_hash: item for item in ran}
             made.append(
@@ -165,15 +165,13 @@ class StoredRack:
     def _commons(self) -> Mapping[str, CommonSpec]:
         return commons_of(self.config)
 
-    def _checked(self, source: SourceText, module: ModuleConfig, name: str) -> CheckResult:
+    def _check(self, source: SourceText, module: ModuleConfig, name: str) -> CheckResult:
         return check_source(source, name, module.tick_ns, self._commons, module.times)
 
     def programs(self) -> list[Program]:
         """Return the tasks of the rack as they ran when the recording began, those without errors."""
         modules = {task.name: module for module, task in self.config.placed_tasks}
-        checked = (
-            self._checked(source, modules[name], name) for name, source in self.sources.items() if name in modules
-        )
+        checked = (self._check(source, modules[name], name) for name, source in self.sources.items() if name in modules)
         return [result.program for result in checked if result.program is not None]
 
     def check_table(self, table: VariableTable) -> None:
@@ -186,8 +184,8 @@ class StoredRack:
             (number, item.name, item.type.number, item.dimensions, item.length)
             for number, item in enumerate(self.config.variables)
         ]
-        told = [(item.id, item.name, item.type, tuple(item.dimensions), item.length) for item in table.variables]
-        if told != expected:
+        recorded = [(item.id, item.name, item.type, tuple(item.dimensions), item.length) for item in table.variables]
+        if recorded != expected:
             raise BagError("AMX6831", self.bag, "its table of variables is not that of the rack.yaml stored in it")
 
 
@@ -227,7 +225,7 @@ def unknown_value(bag: Path, source: ReplaySource, variable: CommonVariable, whe
     return BagError(
         "AMX6833",
         bag,
-        f"does not tell {variable.name} before {when} s; task {source.name} reads it ({place})",
+        f"does not contain {variable.name} before {when} s; task {source.name} reads it ({place})",
         "record with `automax`, or with the topics /<rack>/backplane and /<rack>/backplane/snapshot",
     )
 

@@ -289,7 +289,7 @@ class TaskReplay:
         elif self._last is not None and scan.scan != self._last + 1:
             self._note(
                 f"scans {self._last + 1} to {scan.scan - 1} are missing before {self._when(scan.stamp)} s; "
-                "it goes on from the next recorded state"
+                "it continues from the next recorded state"
                 if scan.scan > self._last
                 else f"scan {scan.scan} follows on {self._last} at {self._when(scan.stamp)} s"
             )
@@ -407,7 +407,7 @@ class TaskReplay:
             raise unknown_value(self._bag, self._source, variable, self._when(scan.stamp)) from error
         self._note(
             f"at {self._when(scan.stamp)} s {variable.name} is not known: writes are missing in the log; "
-            "it goes on from the next recorded state"
+            "it continues from the next recorded state"
         )
         self._synchronous = False
         self.memory.apart.clear()

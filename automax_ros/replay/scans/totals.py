@@ -28,12 +28,12 @@ class TaskTotals:
     def since(self, base: TaskTotals) -> TaskTotals:
         """Return the totals since ``base``."""
         notes = tuple(note for note in self.notes if note not in base.notes)
-        return self._counted(base, -1, notes)
+        return self._add(base, -1, notes)
 
     def and_then(self, other: TaskTotals) -> TaskTotals:
         """Return the sum of these totals and later ones."""
         notes = tuple(dict.fromkeys((*self.notes, *other.notes)))[:MOST_NOTES]
-        return self._counted(other, 1, notes)
+        return self._add(other, 1, notes)
 
     def report(self) -> TaskReport:
         """Return the task's part of the report."""
@@ -46,7 +46,7 @@ class TaskTotals:
             notes = [*notes[:_NOTES_SHOWN], f"and {len(notes) - _NOTES_SHOWN} notes more"]
         return TaskReport(self.name, self.source, self.edited, self.compared, self.different, self.states, tuple(notes))
 
-    def _counted(self, other: TaskTotals, sign: int, notes: tuple[str, ...]) -> TaskTotals:
+    def _add(self, other: TaskTotals, sign: int, notes: tuple[str, ...]) -> TaskTotals:
         return replace(
             self,
             compared=self.compared + sign * other.compared,

@@ -53,15 +53,14 @@ class Tunables:
         Raises:
             BagError: the state does not fit the task.
         """
-        told = self._told(state)
+        recorded = self._recorded_values(state)
         fresh: dict[str, Value] = {}
         for name, value in self._changed.items():
-            if told.get(name, self._current[name]) == self._current[name]:
+            if recorded.get(name, self._current[name]) == self._current[name]:
                 fresh[name] = value
             else:
-                self._note(
-                    f"tunable {name} had been set to {told[name]:.8g} before {self._when(state.stamp)} s: that counts"
-                )
+                when = self._when(state.stamp)
+                self._note(f"tunable {name} had been set to {recorded[name]:.8g} before {when} s: that counts")
         return fresh
 
     def know(self, state: TaskState) -> None:
@@ -70,7 +69,7 @@ class Tunables:
         Raises:
             BagError: the state does not fit the task.
         """
-        self._known.update(self._told(state))
+        self._known.update(self._recorded_values(state))
 
     def set_again(self, task: Task, state: TaskState) -> None:
         """Set the tunables that the operator has set since the previous state.
@@ -78,12 +77,12 @@ class Tunables:
         Raises:
             BagError: the state does not fit the task.
         """
-        for name, value in self._told(state).items():
+        for name, value in self._recorded_values(state).items():
             if self._known.get(name) == value:
                 continue
             self._known[name] = value
-            told = source_text(value) if type_of_name(name) is DataType.REAL else f"{value:.10g}"
-            what = f"tunable {name} set to {told} at {self._when(state.stamp)} s"
+            text = source_text(value) if type_of_name(name) is DataType.REAL else f"{value:.10g}"
+            what = f"tunable {name} set to {text} at {self._when(state.stamp)} s"
             try:
                 task.tune(name, value)
             except KeyError:
@@ -93,7 +92,7 @@ class Tunables:
             else:
                 self._note(what)
 
-    def _told(self, state: TaskState) -> dict[str, float]:
+    def _recorded_values(self, state: TaskState) -> dict[str, float]:
         """Return the tunables in a state; their places are looked up once per layout."""
         if self._places is None or self._places[0] != state.layout_hash:
             self._places = (state.layout_hash, places_of(self._bag, state, self._names))

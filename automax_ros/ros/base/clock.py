@@ -57,7 +57,7 @@ class RackClock:
         if simulated is not None:
             self.pace = SimulatedPacer(scheduler, self._publish_time, rate=simulated.rate, turn=lock.for_scan)
         elif follows:
-            self.pace = self._follower = FollowingPacer(scheduler, self._jumped, turn=lock.for_scan)
+            self.pace = self._follower = FollowingPacer(scheduler, self._report_jump, turn=lock.for_scan)
         else:
             self.pace = Pacer(scheduler, turn=lock.for_scan)
 
@@ -100,7 +100,7 @@ class RackClock:
             message = decode(_TYPE, payload or b"")
             assert isinstance(message, Clock)
             if not 0 <= message.clock < _LATEST_NS:
-                raise CdrError(f"{message.clock} ns is not a time that a clock tells")
+                raise CdrError(f"{message.clock} ns is not a valid clock time")
             self._follow(message.clock)
         except CdrError as error:
             text = f"{CLOCK}: {error}"
@@ -120,7 +120,7 @@ class RackClock:
             stamp = self._rack_context.stream.stamp(self._follower.now_ns) + self._follower.ahead_ns(clock_ns)
             if stamp >= _LATEST_NS:
                 raise CdrError(f"{clock_ns} ns comes after a clock that went back, and would be a stamp of {stamp} ns")
-            self._follower.heard(clock_ns)
+            self._follower.follow_to(clock_ns)
 
     def _check_publishers(self, own: int) -> None:
         assert self._node is not None
@@ -131,7 +131,7 @@ class RackClock:
                 self._node.get_logger().warning(text)
             self._rack_context.health.note(TAKEN, CLOCK, lambda: text)
 
-    def _jumped(self, by_ns: int) -> None:
+    def _report_jump(self, by_ns: int) -> None:
         assert self._rack_context is not None
         assert self._node is not None
         if by_ns > 0:

@@ -16,7 +16,7 @@ from rclpy.lifecycle import LifecycleNodeMixin, TransitionCallbackReturn
 
 from automax_ros.core.text import printable
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.ros.intake.guard import MOST_TOLD, RequestGuard
+from automax_ros.ros.intake.guard import MOST_SHOWN, RequestGuard
 from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred
 
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = "unconfigured", "inactive", "active", "finalized"
@@ -114,7 +114,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         LifecycleNodeMixin.__init__(self)
         self._duties, self._guard, self._enter = duties, guard, enter
         change = self._service_change_state
-        change.callback = self._requested
+        change.callback = self._handle_request
         allow_deferred(change)
         for service in (
             change,
@@ -176,10 +176,10 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
         self._trigger(result.to_label())
         if result is _ERROR and error is not None:
             self._guard.report(f"transition {transition} failed, everything is stopped", error)
-            self._trigger(self._stopped().to_label())
+            self._trigger(self._stop().to_label())
         done(error)
 
-    def _stopped(self) -> TransitionCallbackReturn:
+    def _stop(self) -> TransitionCallbackReturn:
         try:
             self._duties.fail()
         except Exception as error:
@@ -187,11 +187,11 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
             return _FAILURE
         return _SUCCESS
 
-    def _requested(self, request: Any, response: Any) -> Any:
+    def _handle_request(self, request: Any, response: Any) -> Any:
         name = _name(request.transition)
         reason = self._duties.refusal(name) if name else "it is not a transition that can be asked for"
         if reason is not None:
-            self._refuse(name or printable(request.transition.label[:MOST_TOLD]), reason)
+            self._refuse(name or printable(request.transition.label[:MOST_SHOWN]), reason)
             return response
 
         def begin(respond: Respond) -> None:
@@ -215,7 +215,7 @@ class LifecycleNode(LifecycleNodeMixin):  # type: ignore[misc]
 
     def _refuse(self, transition: str, reason: str) -> None:
         self.get_logger().warning(f"transition {transition} refused: {reason}")
-        self._guard.refused(transition, reason[:MOST_TOLD], reason[:MOST_TOLD])
+        self._guard.refused(transition, reason[:MOST_SHOWN], reason[:MOST_SHOWN])
 
 
 def _name(transition: Any) -> str:

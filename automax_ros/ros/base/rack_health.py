@@ -31,7 +31,7 @@ class RackHealth:
         rack, operations = self._rack_context.rack, self._rack_context.rack.operations
         counts = self._rack_context.health.counts
         skipped = sum(item.skipped for item in rack.statistics.values())
-        level, text = self._judged(skipped, sum(counts.values()))
+        level, text = self._judge(skipped, sum(counts.values()))
         cause = operations.stopped
         values = {
             "time_s": f"{now_ns / 1e9:.3f}",
@@ -51,7 +51,7 @@ class RackHealth:
         name = f"{rack.config.namespace}/{self._part}"
         return [status_of(name, rack.config.name, level, text, values)]
 
-    def _judged(self, skipped: int, troubles: int) -> tuple[bytes, str]:
+    def _judge(self, skipped: int, troubles: int) -> tuple[bytes, str]:
         operations, diagnostics = self._rack_context.rack.operations, self._rack_context.diagnostics
         newly_skipped = diagnostics.newly(OVERRUNS, skipped)
         newly_troubled = diagnostics.newly("troubles", troubles)
@@ -61,7 +61,7 @@ class RackHealth:
         if not operations.powered:
             return DiagnosticStatus.WARN, "the power is off"
         if is_halted(self._rack_context.pacer):
-            return DiagnosticStatus.WARN, "halted: rack time stands still"
+            return DiagnosticStatus.WARN, "halted: rack time is frozen"
         if cause is not None:
             return DiagnosticStatus.WARN, f"{cause.title}: {cause.reason}"
         if newly_skipped:

@@ -134,7 +134,7 @@ class Player:
         """Create the publishers; a topic that cannot be played gets its ``fault``."""
         for topic in self._survey.topics.values():
             if not topic.fault:
-                kind = _installed(topic)
+                kind = _find_class(topic)
                 if kind is not None:
                     self._open(topic, kind)
         if self._with_clock:
@@ -287,7 +287,7 @@ class _Outlet:
         return not self.publisher.wait_for_all_acked(Duration(nanoseconds=NS_PER_MS))
 
 
-def _installed(topic: PlayTopic) -> Any | None:
+def _find_class(topic: PlayTopic) -> Any | None:
     """Return the class of a topic's messages; None, and the topic's ``fault``, if it is not installed."""
     match = _TYPE.fullmatch(topic.type_name)
     # Only packages that say they hold interfaces are imported: the name comes from the recording.

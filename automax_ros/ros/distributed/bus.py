@@ -164,7 +164,7 @@ class DistributedMemory:
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._watch, self._lead_ns = ProcessWatch(), process_layout.start_delay_ns
         self.peers = Peers(process, min(own), own, rack.installed, process_layout.run_id, lives=self._watch.lives)
-        self.link = ImageSync(rack, min(own), self._send, process_layout.is_common, self._guarded)
+        self.link = ImageSync(rack, min(own), self._send, process_layout.is_common, self._run_guarded)
         self._recorder = RecorderWait(rack_context, nodes, PRESENCE) if process_layout.awaits_recorder else None
         self.stage, self.joining = Stage.JOINING, False
         self.fault: ProcessAlreadyRuns | None = None
@@ -231,7 +231,7 @@ class DistributedMemory:
         """Announce that this process ends normally."""
         self.link.take_waiting()
         self.stage = Stage.LEAVING
-        self._guarded(self._publish_presence)
+        self._run_guarded(self._publish_presence)
         self._watch.close()
 
     # outgoing messages
@@ -274,7 +274,7 @@ class DistributedMemory:
     def _beat(self) -> None:
         now = time.monotonic_ns()
         for peer in self.peers.look(now):
-            self._lost(peer)
+            self._handle_lost(peer)
         if self.stage in (Stage.JOINING, Stage.READY):
             self._advance(now)
         self._publish_presence(self._process_to_request())
@@ -314,7 +314,7 @@ class DistributedMemory:
         owing = self.peers.owing() if self._begun else None
         return owing.process if owing is not None else 0
 
-    def _lost(self, peer: Peer) -> None:
+    def _handle_lost(self, peer: Peer) -> None:
         self._watch.forget(peer.process)
         self._participants.pop(peer.process, None)
         name = part_name(self._rack.config, peer.presence.slots)
@@ -335,7 +335,7 @@ class DistributedMemory:
     ) -> BusTopic:
         return BusTopic(self._node, topic, f"automax_msgs/msg/{kind.__name__}", qos, receive, self._refuse, terms)
 
-    def _guarded(self, take: Callable[[], None]) -> None:
+    def _run_guarded(self, take: Callable[[], None]) -> None:
         try:
             take()
         except Exception as error:
@@ -395,7 +395,7 @@ class DistributedMemory:
         if wrong and presence.fingerprint == self.peers.fingerprint and presence.process != self.peers.process:
             self._refuse(PRESENCE, wrong)
             return
-        found = self.peers.heard(presence, time.monotonic_ns())
+        found = self.peers.receive(presence, time.monotonic_ns())
         if found is PresenceVerdict.OWN:
             return
         if found not in (PresenceVerdict.KNOWN, PresenceVerdict.NEW):

@@ -98,7 +98,7 @@ class RequestForwarder:
 
         def end() -> Any:
             silent = [self._name(part.process) for part in parts if answers[part.process] is None]
-            found = _merged(response, request, parts, answers, silent)
+            found = _merge(response, request, parts, answers, silent)
             if service == "reload" and _is_ok(found):
                 self._note_source(request)
             return found
@@ -206,11 +206,11 @@ class _PendingRequest:
         for part, client in waiting:
             if client.service_is_ready():
                 future = client.call_async(part.request)
-                future.add_done_callback(lambda found, process=part.process: self._answered(process, found))
+                future.add_done_callback(lambda found, process=part.process: self._take_answer(process, found))
             else:
                 self._not_called.append((part, client))
 
-    def _answered(self, process: int, future: Any) -> None:
+    def _take_answer(self, process: int, future: Any) -> None:
         with self._node.rack_context.between_scans():
             if process in self._open:
                 self._open.discard(process)
@@ -228,7 +228,7 @@ class _PendingRequest:
             self._done()
 
 
-def _merged(
+def _merge(
     response: Any, request: Any, parts: Sequence[PartRequest], answers: dict[int, Any], silent: Sequence[str]
 ) -> Any:
     """Return one response: lists concatenated, numbers of tasks added up, OK if all are.

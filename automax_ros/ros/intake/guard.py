@@ -19,7 +19,7 @@ from automax_ros.runtime.health import Health
 
 FAILED, REFUSED = "failed callback", "refused request"
 """Names under which ``Health`` counts them."""
-MOST_TOLD, MOST_LOGGED = 300, 20
+MOST_SHOWN, MOST_LOGGED = 300, 20
 """Most characters of an error, and most failures, that are logged: a client may repeat a bad request forever."""
 _LAST_TYPE = ParameterType.PARAMETER_STRING_ARRAY
 
@@ -51,7 +51,7 @@ class RequestGuard:
 
     def report(self, what: str, error: Exception) -> None:
         """Count a failure and log it."""
-        text = f"{what}: {type(error).__name__}: {str(error)[:MOST_TOLD]}"
+        text = f"{what}: {type(error).__name__}: {str(error)[:MOST_SHOWN]}"
         self._health.note(FAILED, (what, type(error)), lambda: text)
         if self._health.counts[FAILED] <= MOST_LOGGED:
             self._log(text)
@@ -75,7 +75,7 @@ class RequestGuard:
         The response has one result, however many parameters were to be set (decision: who asks looks at the first).
         """
         self.report(f"a request to {name} was refused", error)
-        reason = str(error)[:MOST_TOLD]
+        reason = str(error)[:MOST_SHOWN]
         if kind is SetParameters:
             return kind.Response(results=[SetParametersResult(successful=False, reason=reason)])
         response = _refusal(kind, None, reason)
@@ -119,7 +119,7 @@ def _check_types(request: Any) -> None:
 
 
 def _refusal(kind: Any, request: Any, reason: str) -> Any:
-    result = SetParametersResult(successful=False, reason=reason[:MOST_TOLD])
+    result = SetParametersResult(successful=False, reason=reason[:MOST_SHOWN])
     if kind is SetParameters:
         return kind.Response(results=[result] * len(request.parameters))
     return kind.Response(result=result) if kind is SetParametersAtomically else kind.Response()

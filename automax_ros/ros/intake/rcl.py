@@ -123,12 +123,12 @@ def library() -> Library | None:
     import rclpy.impl.implementation_singleton  # noqa: F401 loads it
 
     try:
-        return Library(_opened("rcl"), _opened("rcutils"))
+        return Library(_open_library("rcl"), _open_library("rcutils"))
     except (OSError, AttributeError):
         return None
 
 
-def _opened(name: str) -> ctypes.CDLL:
+def _open_library(name: str) -> ctypes.CDLL:
     """Return a library that this process has loaded; wheels add a hash to its name.
 
     Raises:

@@ -119,8 +119,8 @@ class NetworkNode(ModuleNode):
             "drop": str(status.drop),
             "depth": str(status.depth),
             "depth_defined": str(status.defined).lower(),
-            "heard": _listed(status.heard),
-            "lost": _listed(status.lost),
+            "heard": _list_text(status.heard),
+            "lost": _list_text(status.lost),
             "code": status.code,
             **{name: str(count) for name, count in status.counters},
         }
@@ -142,9 +142,9 @@ def _read(payload: bytes) -> tuple[Sender, DropMessage] | None:
 
 def _sentence(status: NetworkStatus) -> str:
     if status.lost:
-        return f"code {status.code}: nothing comes from drops {_listed(status.lost)}"
-    return f"hears drops {_listed(status.heard)}" if status.heard else "hears nobody yet"
+        return f"code {status.code}: nothing comes from drops {_list_text(status.lost)}"
+    return f"receives from drops {_list_text(status.heard)}" if status.heard else "receives from no drop yet"
 
 
-def _listed(drops: Sequence[int]) -> str:
+def _list_text(drops: Sequence[int]) -> str:
     return ", ".join(map(str, drops))

@@ -80,7 +80,7 @@ class Reloading:
         self._work.close()
 
 
-MOST_TOLD = 300
+MOST_SHOWN = 300
 """Most characters of an unforeseen error in a response."""
 
 
@@ -96,13 +96,13 @@ class OperatorServices:
         self.forward_by: RequestForwarder | None = None
         self._requests = OperatorRequests(self._rack_context.rack, self._rack_context.pacer)
         self._begun_ns = time.monotonic_ns()
-        self._reloading = Reloading(node, self._requests.reloads, partial(self._concluded, "reload"))
+        self._reloading = Reloading(node, self._requests.reloads, partial(self._finish_response, "reload"))
         self._answers: dict[str, Callable[[Any, Any], Any]] = {}
         for name, verb in VERBS.items():
-            self._answers[name] = self._reloading.answer if name == "reload" else partial(self._answered, name)
+            self._answers[name] = self._reloading.answer if name == "reload" else partial(self._answer, name)
             package, _, kind = verb.type_name.partition("/")
             service = message_class(f"{package}/srv/{kind}")
-            allow_deferred(node.create_service(service, name_of(name), partial(self._routed, name, service)))
+            allow_deferred(node.create_service(service, name_of(name), partial(self._route, name, service)))
 
     def close(self) -> None:
         """End; a source that is being compiled is not installed."""
@@ -115,20 +115,20 @@ class OperatorServices:
             done("" if response.success else response.message or "refused")
 
         kind = message_class("std_srvs/srv/Trigger")
-        answer = self._routed("run_all", kind, kind.Request(), kind.Response())
+        answer = self._route("run_all", kind, kind.Request(), kind.Response())
         if isinstance(answer, DeferredResponse):
             answer.begin(respond)
         else:
             respond(answer)
 
-    def _routed(self, name: str, kind: Any, request: Any, response: Any) -> Any:
+    def _route(self, name: str, kind: Any, request: Any, response: Any) -> Any:
         """Return a response, or ``DeferredResponse`` if other processes must answer first."""
         if self.forward_by is None:
             return self._answers[name](request, response)
         with self._rack_context.between_scans():
             return self.forward_by.answer(name, kind, request, response, self._answers[name])
 
-    def _answered(self, name: str, request: Any, response: Any) -> Any:
+    def _answer(self, name: str, request: Any, response: Any) -> Any:
         """Execute a request in this process, and return its response."""
         with self._rack_context.between_scans():
             error: Exception | None = None
@@ -138,15 +138,15 @@ class OperatorServices:
                 _fill(response, {**fields, **self._of_the_graph(name)})
             except Exception as raised:
                 error = raised
-            return self._concluded(name, request, response, error, has_now="now" in fields)
+            return self._finish_response(name, request, response, error, has_now="now" in fields)
 
-    def _concluded(
+    def _finish_response(
         self, name: str, request: Any, response: Any, error: Exception | None, *, has_now: bool = False
     ) -> Any:
         """Return a response with the outcome of the request, and what is true now, unless it has that already."""
         reason = "" if error is None else str(error)
         if error is not None and not isinstance(error, OperationRefused):
-            reason = f"{type(error).__name__}: {reason[:MOST_TOLD]}"
+            reason = f"{type(error).__name__}: {reason[:MOST_SHOWN]}"
             self._node.guard.report(f"a request to {name} was refused", error)
         elif error is not None:
             self._node.guard.refused(name, reason, name)

@@ -74,11 +74,11 @@ class ProcessorNode(ManagedModuleNode):
             self.get_logger().info(f"{task.name}: {task.printed.popleft()}")
 
     def _report_errors(self, task: Task, record: ScanRecord) -> None:
-        told = self._error_throttles[task.name].passes()
+        is_logged = self._error_throttles[task.name].passes()
         for number, (line, code) in enumerate(record.errors):
-            describe = partial(_described, task, LogEntry(line, code, record.scan))
+            describe = partial(_describe, task, LogEntry(line, code, record.scan))
             self.rack_context.health.note("run-time error", (task.name, line, code), describe)
-            if told and number < ERRORS_SHOWN:
+            if is_logged and number < ERRORS_SHOWN:
                 self.get_logger().warning(describe())
 
     def written(self, writes: list[WriteGroup]) -> None:
@@ -159,7 +159,7 @@ class ProcessorNode(ManagedModuleNode):
         return self.status(task.name, level, text, task.slot, shown)
 
 
-def _described(task: Task, entry: LogEntry) -> str:
+def _describe(task: Task, entry: LogEntry) -> str:
     return f"{task.name}: {entry.describe()}"
 
 

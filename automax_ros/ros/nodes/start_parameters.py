@@ -21,7 +21,7 @@ from automax_ros.ros.nodes.processor import ProcessorNode
 from automax_ros.ros.setup.arguments import RosArguments
 from automax_ros.ros.setup.parameter_files import GivenParameter, RosArgumentsError
 
-MOST_TOLD = 10
+MOST_SHOWN = 10
 """Most unused parameters that are reported one by one."""
 _ONE_TIME = "use_sim_time is for a whole rack: give it to all nodes, or to the node rack"
 _OWN_OF_ROS = (SIM_TIME, "start_type_description_service", "qos_overrides.")
@@ -65,8 +65,8 @@ def without_use(arguments: RosArguments, config: RackConfig, declared: Mapping[s
         elif not reached - {MAIN_NODE} - set(declared):
             found[item.key, item.name] = _without_name(item, reached, declared)
     texts = [text for text in found.values() if text]
-    more = [f"{len(texts) - MOST_TOLD} more parameters reach nobody"] if texts[MOST_TOLD:] else []
-    return [*texts[:MOST_TOLD], *more]
+    more = [f"{len(texts) - MOST_SHOWN} more parameters match no node"] if texts[MOST_SHOWN:] else []
+    return [*texts[:MOST_SHOWN], *more]
 
 
 def _without_node(item: GivenParameter, config: RackConfig, names: Iterable[str]) -> str:

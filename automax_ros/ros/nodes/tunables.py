@@ -45,7 +45,7 @@ class Tunable:
     @property
     def initial(self) -> float | int:
         """The parameter's first value: that in the task, a REAL without digits beyond its precision."""
-        return self._shown(self.task.value(self.variable))
+        return self._shown_value(self.task.value(self.variable))
 
     def descriptor(self) -> ParameterDescriptor:
         """Return limits and step.
@@ -53,7 +53,7 @@ class Tunable:
         rclpy refuses values off the grid of LOW and steps, which it computes in floating point. If it would refuse
         HIGH, the present value or 0, or the grid is too fine, only the text gives the step.
         """
-        low, high, step = (self._shown(value) for value in (self.limits.low, self.limits.high, self.limits.step))
+        low, high, step = (self._shown_value(value) for value in (self.limits.low, self.limits.high, self.limits.step))
         descriptor = ParameterDescriptor(description=f"tunable {self.variable} of task {self.task.name}, step {step:g}")
         anchors = (high, self.initial, 0) if low < 0 < high else (high, self.initial)
         on_grid = (high - low) / step <= _MOST_STEPS and all(_on_grid(value, low, step) for value in anchors)
@@ -64,7 +64,7 @@ class Tunable:
             descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=step if on_grid else 1)]
         return descriptor
 
-    def _shown(self, value: object) -> float | int:
+    def _shown_value(self, value: object) -> float | int:
         assert isinstance(value, (int, float))
         return float(real_text(value)) if self.type is DataType.REAL else int(value)
 

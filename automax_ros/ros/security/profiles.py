@@ -53,8 +53,8 @@ def recorder_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:
 
     ``namespace`` is the rack's, with its slash. Reading values, plots and layouts need no more than this.
     """
-    heard = _said(rack)
-    return Enclave(f"{namespace}/recorder", (Profile(namespace, "recorder", subscribe=heard),))
+    published = _published_topics(rack)
+    return Enclave(f"{namespace}/recorder", (Profile(namespace, "recorder", subscribe=published),))
 
 
 def operator_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:
@@ -64,16 +64,16 @@ def operator_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:
         name
         for enclave in enclaves
         for name in enclave.names("subscribe")
-        if name.startswith(f"{namespace}/") and name not in _said(enclaves)
+        if name.startswith(f"{namespace}/") and name not in _published_topics(enclaves)
     )
     served = sorted({name for enclave in enclaves for name in enclave.names("reply")})
     profile = Profile(
-        namespace, "operator_desk", publish=tuple(inputs), subscribe=_said(enclaves), request=tuple(served)
+        namespace, "operator_desk", publish=tuple(inputs), subscribe=_published_topics(enclaves), request=tuple(served)
     )
     return Enclave(f"{namespace}/operator_desk", (profile,))
 
 
-def _said(rack: Iterable[Enclave]) -> tuple[str, ...]:
+def _published_topics(rack: Iterable[Enclave]) -> tuple[str, ...]:
     return tuple(sorted({name for enclave in rack for name in enclave.names("publish")} - {EVENTS}))
 
 

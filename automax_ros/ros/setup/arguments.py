@@ -155,7 +155,7 @@ class _Reader:
                 self._rules.append((option,))
                 continue
             if option not in _WITH_VALUE:
-                raise _unknown(word)
+                raise _unknown_option(word)
             value = next(rest, None)
             if value is None:
                 raise RosArgumentsError(f"{BEGIN}: {word} needs a value")
@@ -198,7 +198,7 @@ def _space_of(text: str, of: str, *, absolute: bool = False) -> str:
     return text.strip("/")
 
 
-def _unknown(word: str) -> RosArgumentsError:
+def _unknown_option(word: str) -> RosArgumentsError:
     options = (*_WITH_VALUE, *_SWITCHES)
     if ":=" in word:
         return RosArgumentsError(f"{BEGIN}: {quoted(word)} stands without an option", "-r renames, -p sets a parameter")

@@ -76,14 +76,14 @@ class InstanceLock:
         self._free()
 
     def _take(self, path: Path, what: str, how: int) -> None:
-        file = self._locked(path, what, how)
+        file = self._lock_file(path, what, how)
         self._files.append((file, path))
         os.ftruncate(file, 0)
         if how == fcntl.LOCK_EX:
             os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
 
     @staticmethod
-    def _locked(path: Path, what: str, how: int) -> int:
+    def _lock_file(path: Path, what: str, how: int) -> int:
         """Return the lock file, open and locked: the one at the path, not one that was removed meanwhile."""
         while True:
             try:
@@ -95,7 +95,7 @@ class InstanceLock:
                 if _stands_at(file, path):
                     return file
             except BlockingIOError:
-                raise _taken(file, what) from None
+                raise _held_error(file, what) from None
             except BaseException:
                 os.close(file)
                 raise
@@ -119,7 +119,7 @@ def _stands_at(file: int, path: Path) -> bool:
         return False
 
 
-def _taken(file: int, what: str) -> RackAlreadyRuns:
+def _held_error(file: int, what: str) -> RackAlreadyRuns:
     """Return the error of a lock file that another process holds; the file is closed."""
     try:
         holder = os.pread(file, 32, 0).decode("ascii", "replace").strip()

@@ -23,7 +23,7 @@ from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.environment import RosUnavailable
 
 _SECURITY = "ROS_SECURITY_ENABLE"
-_MOST_TOLD = 400
+_MOST_SHOWN = 400
 
 
 _TRIAL_PERIOD_S = 0.001
@@ -51,7 +51,7 @@ def joined_context(arguments: RosArguments = NO_ARGUMENTS) -> Context:
             node.destroy_node()
     except RuntimeError as error:
         context.try_shutdown()
-        raise RosUnavailable(f"ROS 2 does not start: {str(error).strip()[:_MOST_TOLD]}") from error
+        raise RosUnavailable(f"ROS 2 does not start: {str(error).strip()[:_MOST_SHOWN]}") from error
     return context
 
 

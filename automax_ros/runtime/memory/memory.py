@@ -127,10 +127,10 @@ class CommonMemory(Image):
         """The forced values: pairs of view and element."""
         return frozenset(self._forced)
 
-    def note_locals(self, writer: int = 0, *, forced: bool, told: bool = True) -> None:
-        """Note whether variables of tasks are forced; ``told`` is False if FORCINGSTATUS@ shows it already."""
+    def note_locals(self, writer: int = 0, *, forced: bool, report: bool = True) -> None:
+        """Note whether variables of tasks are forced; ``report`` is False if FORCINGSTATUS@ shows it already."""
         self._locals_forced = forced
-        if told:
+        if report:
             self._forces_changed(writer)
 
     def is_forced(self, view: int) -> bool:

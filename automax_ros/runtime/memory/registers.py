@@ -60,13 +60,13 @@ class RegisterMap:
         words = self._words(view, element, value, read)
         if place is not None:
             for register, word in words.items():
-                if read(bank, register) != _signed(word):
-                    yield bank, register, _signed(word)
+                if read(bank, register) != _to_signed(word):
+                    yield bank, register, _to_signed(word)
         others = dict.fromkeys(
             other for register in words for other in self._points.get((bank, register), ()) if other != view
         )
         for other in others:
-            shown = self._shown(other, words, read)
+            shown = self._shown_value(other, words, read)
             if shown != read(other, 0):
                 yield other, 0, shown
 
@@ -74,7 +74,7 @@ class RegisterMap:
         """Return the effect of a write to a point or a register on each register that it changes."""
         place = self._places.get(view)
         if place is None:
-            return [Part(view, element, _unsigned(value), WORD)]
+            return [Part(view, element, _to_unsigned(value), WORD)]
         if place.bit is not None:
             return [Part(place.bank, place.register, int(bool(value)) << place.bit, 1 << place.bit)]
         words = self._words(view, element, value, lambda *_: 0)
@@ -93,7 +93,7 @@ class RegisterMap:
             if (point, 0) in forced:
                 bit = self._places[point].bit
                 mask = WORD if bit is None else 1 << bit
-                value = _signed(_unsigned(value) & ~mask | _unsigned(read(view, element)) & mask)
+                value = _to_signed(_to_unsigned(value) & ~mask | _to_unsigned(read(view, element)) & mask)
         return value
 
     def showing(self, bank: int, registers: Iterable[int]) -> frozenset[tuple[int, int]]:
@@ -127,34 +127,34 @@ class RegisterMap:
             return {element: number & WORD}
         first = place.register
         if place.bit is not None:
-            before = _unsigned(read(place.bank, first))
+            before = _to_unsigned(read(place.bank, first))
             return {first: before & ~(1 << place.bit) | number << place.bit}
         if kind in _TWO_WORDS:
             return {first: number >> 16 & WORD, first + 1: number & WORD}
         return {first: number & WORD}
 
-    def _shown(self, view: int, words: dict[int, int], read: Callable[[int, int], Value]) -> Value:
+    def _shown_value(self, view: int, words: dict[int, int], read: Callable[[int, int], Value]) -> Value:
         """Return the value of a point from its registers; ``words`` are those that have just changed.
 
         Bits that are not a REAL show as 0 or as its largest (decision).
         """
         place = self._places[view]
-        found = [words.get(number, _unsigned(read(place.bank, number))) for number in self._registers(view)]
+        found = [words.get(number, _to_unsigned(read(place.bank, number))) for number in self._registers(view)]
         if place.bit is not None:
             return bool(found[0] >> place.bit & 1)
         if self._types[view] is DataType.REAL:
             real: float = struct.unpack(">f", (found[0] << 16 | found[1]).to_bytes(4, "big"))[0]
             return 0.0 if math.isnan(real) else stored_real(real)[0]
         if len(found) == 2:
-            return _signed(found[0]) << 16 | found[1]
-        return _signed(found[0])
+            return _to_signed(found[0]) << 16 | found[1]
+        return _to_signed(found[0])
 
 
-def _signed(word: int) -> int:
+def _to_signed(word: int) -> int:
     return word - 0x10000 if word & 0x8000 else word
 
 
-def _unsigned(value: Value) -> int:
+def _to_unsigned(value: Value) -> int:
     assert not isinstance(value, str)
     return int(value) & WORD
 

@@ -24,7 +24,7 @@ class ModeledExecution:
     """Executes jobs one at a time: the highest priority first, equals in alphabetical order.
 
     A job of higher priority suspends a lower one, which continues after it (PC3000 manual p. 15-2). Equals do not
-    suspend each other (decision: no source tells of time-slicing).
+    suspend each other (decision: no source mentions time-slicing).
     """
 
     def __init__(self, scheduler: Scheduler, name: str) -> None:

@@ -61,7 +61,7 @@ class ReplayableReads:
         if self._replayed is None:
             self.latched_ns = self._memory.now_ns
             values = self._memory.latch(plan)
-            self._accessed(self.latched)
+            self._note_access(self.latched)
         else:
             values = tuple(next(self._replayed))
         self.noted.append(values)
@@ -71,7 +71,7 @@ class ReplayableReads:
         """Return an actual value."""
         if self._replayed is None:
             value: Value = self._memory.read_now(view, element)
-            self._accessed((view,))
+            self._note_access((view,))
         else:
             value = next(self._replayed)
         self.noted.append(value)
@@ -93,7 +93,7 @@ class ReplayableReads:
         """Write the values that the scan's blocks changed."""
         if self._replayed is None:
             self._memory.commit(changes, writer)
-            self._accessed([view for view, _ in changes] if self._accesses else ())
+            self._note_access([view for view, _ in changes] if self._accesses else ())
 
     def write_now(
         self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
@@ -101,9 +101,9 @@ class ReplayableReads:
         """Write an actual value."""
         if self._replayed is None:
             self._memory.write_now(view, value, writer, element, kind)
-            self._accessed((view,))
+            self._note_access((view,))
 
-    def _accessed(self, views: Sequence[int]) -> None:
+    def _note_access(self, views: Sequence[int]) -> None:
         if self._accesses:
             for view in views:
                 watcher = self._accesses.get(view)

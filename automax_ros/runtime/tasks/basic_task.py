@@ -40,32 +40,32 @@ class BasicIo(TaskIo):
     def open_reader(self, number: int, types: str, depth: int) -> int:
         """Make the task the reader of a channel; return the problem or 0."""
         name, open_reader, memory = self._basic.name, self._channels.open_reader, self._memory
-        return self._noted(number, self._outcome_of(lambda: open_reader(number, types, depth, name, memory.now_ns)))
+        return self._note(number, self._outcome_of(lambda: open_reader(number, types, depth, name, memory.now_ns)))
 
     def open_writer(self, number: int, types: str) -> int:
         """Find a channel; return 0, the problem, or MUST_WAIT while no task reads it."""
-        return self._noted(number, self._outcome_of(lambda: self._channels.open_writer(number, types)))
+        return self._note(number, self._outcome_of(lambda: self._channels.open_writer(number, types)))
 
     def receive(self, number: int) -> tuple[Message, int]:
         """Receive the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
         types, name, memory = self._basic.types(number), self._basic.name, self._memory
         message, outcome = self._outcome_of(lambda: self._channels.receive(number, types, name, memory.now_ns))
-        return message, self._noted(number, outcome, message)
+        return message, self._note(number, outcome, message)
 
     def send(self, number: int, message: Message) -> int:
         """Send a message to a channel; return 0, the problem, or MUST_WAIT if it is full."""
         types, memory = self._basic.types(number), self._memory
         outcome = self._outcome_of(lambda: self._channels.send(number, types, message, memory.now_ns))
-        return self._noted(number, outcome, () if outcome else message)
+        return self._note(number, outcome, () if outcome else message)
 
-    def _noted(self, number: int, outcome: int, items: Message = ()) -> int:  # noqa: ARG002
+    def _note(self, number: int, outcome: int, items: Message = ()) -> int:  # noqa: ARG002
         return outcome
 
 
 class RecordingBasicIo(BasicIo, RecordingIo):
     """The same, with everything noted, the outcomes of channels and the items among the reads."""
 
-    def _noted(self, number: int, outcome: int, items: Message = ()) -> int:
+    def _note(self, number: int, outcome: int, items: Message = ()) -> int:
         reads = self.record.reads
         reads.append((CHANNEL_VIEWS[DataType.INTEGER], number, outcome))
         if items:

@@ -22,7 +22,7 @@ LONGEST_JUMP_NS = 10 * NS_PER_S
 
 
 class FollowingPacer(SteppedPacer):
-    """Makes a scheduler's time follow a clock; its receiver calls ``heard`` while it holds ``turn``."""
+    """Makes a scheduler's time follow a clock; its receiver calls ``follow_to`` while it holds ``turn``."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class FollowingPacer(SteppedPacer):
         self._zero_ns, self._opens = received - self._scheduler.now_ns, True
         return received
 
-    def heard(self, clock_ns: int) -> None:
+    def follow_to(self, clock_ns: int) -> None:
         """Follow the clock to a time, and execute all events up to it if the rack has started."""
         if clock_ns <= 0:
             return
@@ -69,7 +69,7 @@ class FollowingPacer(SteppedPacer):
         return 0 if self._zero_ns is None else clock_ns - self._zero_ns - self._scheduler.now_ns
 
     def step(self) -> float:
-        """Execute the events at the instant of ``begin``; later ones are executed by ``heard``."""
+        """Execute the events at the instant of ``begin``; later ones are executed by ``follow_to``."""
         if self._opens:
             self._opens = False
             self._advance(self._scheduler.now_ns)

@@ -143,7 +143,7 @@ class Scheduler:
                 continue
             self.now_ns = instant
             if event.period_ns:
-                heapq.heapreplace(queue, self._queued(instant + event.period_ns, event))
+                heapq.heapreplace(queue, self._queue_entry(instant + event.period_ns, event))
             else:
                 heapq.heappop(queue)
             event.action(instant, 0)
@@ -164,7 +164,7 @@ class Scheduler:
         self.now_ns = self._end_ns = due
         event = heapq.heappop(self._queue)[5]
         if event.period_ns:
-            heapq.heappush(self._queue, self._queued(due + event.period_ns, event))
+            heapq.heappush(self._queue, self._queue_entry(due + event.period_ns, event))
         event.action(due, 0)
         return True
 
@@ -179,7 +179,7 @@ class Scheduler:
         while queue and queue[0][0] <= now_ns:
             instant, _, _, _, _, event = queue[0]
             if event.period_ns and not event.cancelled:
-                heapq.heapreplace(queue, self._queued(instant + event.period_ns, event))
+                heapq.heapreplace(queue, self._queue_entry(instant + event.period_ns, event))
             else:
                 heapq.heappop(queue)
             if not event.cancelled:
@@ -207,6 +207,6 @@ class Scheduler:
         due = self.next_ns
         self.now_ns = max(self.now_ns, now_ns if due is None else min(now_ns, due))
 
-    def _queued(self, time_ns: int, event: ScheduledEvent) -> _Queued:
+    def _queue_entry(self, time_ns: int, event: ScheduledEvent) -> _Queued:
         self._serial += 1
         return time_ns, event.key.event_class, event.key.priority, event.key.name, self._serial, event

@@ -30,19 +30,19 @@ class SimulatedPacer(SteppedPacer):
     def __init__(
         self,
         scheduler: Scheduler,
-        tell: Callable[[int], object],
+        publish: Callable[[int], object],
         *,
         rate: float | None = None,
         clock: Callable[[], int] = WALL_CLOCK,
         wait: Wait = WALL_WAIT,
         turn: Turn | None = None,
     ) -> None:
-        """Create it; ``tell`` gets the time once all events up to and at it are executed.
+        """Create it; ``publish`` gets the time once all events up to and at it are executed.
 
         Time passes at ``rate`` times that of ``clock`` (the wall clock, ns), as fast as possible if None.
         """
         super().__init__(scheduler, clock=clock, wait=wait, turn=turn)
-        self._publish, self._rate = tell, rate
+        self._publish, self._rate = publish, rate
         self._zero_ns: int | None = None
         self._published_ns: int | None = None
         self.halted = False

@@ -153,7 +153,7 @@ class StimuliPlayer:
         self.refused = 0
         self.is_acting = False
         self._everywhere = False
-        self._told = 0
+        self._reported = 0
 
     def begin(self, *, joining: bool = False) -> None:
         """Start; entries of now and of times that have passed are executed now, in their order.
@@ -178,8 +178,8 @@ class StimuliPlayer:
 
     def news(self) -> list[str]:
         """Return a line for each refusal since the last call."""
-        told, self._told = self._told, len(self.happened)
-        return [_line(item) for item in self.happened[told:] if not item.ok]
+        first, self._reported = self._reported, len(self.happened)
+        return [_line(item) for item in self.happened[first:] if not item.ok]
 
     def _post(self) -> None:
         if self._waiting:

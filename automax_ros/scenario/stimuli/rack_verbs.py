@@ -74,7 +74,7 @@ def _text(verb: Scalar, node: Node, where: str, findings: ProblemList) -> str | 
         findings.add("AMX6742", message, verb.span, near_or_listed(verb.text, VERBS))
         return None
     if isinstance(node, Mapping) and known.keys:
-        text = _joined(known, node, f"{verb.text} of {where}", findings)
+        text = _join_values(known, node, f"{verb.text} of {where}", findings)
         if not text:
             return None
     else:
@@ -93,7 +93,7 @@ def _plain(node: Node) -> str:
     return node.text if isinstance(node, Scalar) and not node.is_null else ""
 
 
-def _joined(verb: PlantVerb, node: Mapping, what: str, findings: ProblemList) -> str:
+def _join_values(verb: PlantVerb, node: Mapping, what: str, findings: ProblemList) -> str:
     """Return the values of a form with keys, one after the other; "" if a problem was reported.
 
     A value that is left out before another is the usual one.
@@ -268,10 +268,10 @@ class _Tasks:
 
     def tune(self, node: Node, what: str, findings: ProblemList) -> list[Action]:
         """Read names TASK.NAME with values."""
-        found = (self._tuned(key, value, findings) for key, value in named(node, what, findings))
+        found = (self._tune(key, value, findings) for key, value in named(node, what, findings))
         return [item for item in found if item is not None]
 
-    def _tuned(self, key: Scalar, node: Node, findings: ProblemList) -> Operate | None:
+    def _tune(self, key: Scalar, node: Node, findings: ProblemList) -> Operate | None:
         owner, dot, name = key.text.partition(".")
         if not dot:
             hint = "write TASK.NAME, such as SPEED.KP"

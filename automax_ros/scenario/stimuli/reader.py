@@ -125,14 +125,14 @@ class _Reader:
         key, value = given[0]
         verb = self.verbs.get(key.text)
         if verb is None:
-            self._unknown(key)
+            self._report_unknown(key)
             return None
         actions = verb.read(value, key.text, self.findings)
         if at_ns is None:
             return None
         return Stimulus(at_ns, key.text, key.span.line, tuple(actions), verb.is_value, verb.is_value or verb.everywhere)
 
-    def _unknown(self, key: Scalar) -> None:
+    def _report_unknown(self, key: Scalar) -> None:
         if key.text in self.elsewhere:
             message = f"a task alone has no {quoted(key.text)}: only a rack does (`automax run`)"
             self.findings.add("AMX6733", message, key.span, f"it has {', '.join(self.verbs)}")

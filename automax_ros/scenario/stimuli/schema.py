@@ -42,10 +42,10 @@ def _seconds(text: str) -> Schema:
 
 
 def _values(text: str) -> Schema:
-    return _each(text, scalar("The value."))
+    return _map_schema(text, scalar("The value."))
 
 
-def _each(text: str, value: Schema) -> Schema:
+def _map_schema(text: str, value: Schema) -> Schema:
     return {**entries(text, _NAME, value), "minProperties": 1}
 
 
@@ -58,7 +58,7 @@ def _always(text: str) -> Schema:
 
 
 def _wave(text: str, keys: Keys, *required: str) -> Schema:
-    return _each(text, section(text, keys, required))
+    return _map_schema(text, section(text, keys, required))
 
 
 def _square(text: str) -> Schema:
@@ -106,7 +106,7 @@ VERB_SCHEMAS: Keys = {
     "run": _names("Puts tasks into RUN."),
     "stop": _names("Stops tasks."),
     "delete": _names("Deletes tasks."),
-    "reload": _each(
+    "reload": _map_schema(
         "Installs other sources of tasks.",
         either("The source.", _RELOAD["file"], section("The source, and how.", _RELOAD, ("file",))),
     ),
@@ -119,7 +119,7 @@ VERB_SCHEMAS: Keys = {
         _SLOT,
         {**entries("Switches with their positions.", "^[a-z_]+$", scalar("A position.")), "minProperties": 1},
     ),
-    "plant": _each(
+    "plant": _map_schema(
         "Breaks, mends or loads plants.",
         {
             **section("What happens to the plant.", {name: _of_plant(verb) for name, verb in VERBS.items()}),

@@ -47,7 +47,7 @@ def test_what_was_lost_is_told(automax, bag):
     result = automax("bag", "repair", "bag")
     assert (result.code, result.err) == (0, "")
     assert "scans_0.mcap: not finished: index and summary are missing" in result.out
-    assert "belong to no whole record, 1 chunk cut or damaged" in result.out
+    assert "belong to no complete record, 1 chunk cut or damaged" in result.out
     assert "bag: has no metadata.yaml" in result.out
     assert "274 scans, to 2.992000 s of rack time" in result.out
     assert result.out.splitlines()[-1] == "repaired: bag_repaired"

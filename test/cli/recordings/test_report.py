@@ -363,7 +363,7 @@ def test_what_comes_later_is_not_lost_to_what_comes_often(automax, bag):
         recording.operation(60.0, "stop_all", "")
     ((run, _),) = drive_report(automax.folder / "bag").drives
     assert run.events[-1].text == "stop_all"
-    assert (run.fault_count, len(run.faults), run.untold) == (2500, 2000, 6000)
+    assert (run.fault_count, len(run.faults), run.omitted) == (2500, 2000, 6000)
 
 
 def two_drives(bag):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli.run.process_messages import ProcessOutput, Reported, TextLine, heard, send_report
+from automax_ros.cli.run.process_messages import ProcessOutput, Reported, TextLine, parse_message, send_report
 from automax_ros.cli.run.status import Progress, Summary, merged_progress, merged_summary
 from automax_ros.cli.run.supervisor import BACKOFFS_NS, STAGE_NS, WINDOW_NS, ProcessSpec, Restarts, Supervisor
 from automax_ros.core.ticks import NS_PER_S
@@ -230,14 +230,14 @@ def test_what_a_process_tells_is_heard_alike(capsys):
     screen.message("a line")
     send_report({"rack": "PM1"})
     lines = capsys.readouterr().out.splitlines()
-    assert [heard(line) for line in lines] == [progress, summary, TextLine("a line"), Reported({"rack": "PM1"})]
+    assert [parse_message(line) for line in lines] == [progress, summary, TextLine("a line"), Reported({"rack": "PM1"})]
 
 
 @pytest.mark.parametrize(
     "line", ["", "text", "[1]", '{"a": 1}', '{"progress": 1}', '{"progress": {"x": 1}}', "[" * 9999]
 )
 def test_other_lines_are_said_as_they_are(line):
-    assert heard(line) == TextLine(line)
+    assert parse_message(line) == TextLine(line)
 
 
 def test_parts_of_a_rack_are_told_as_one():

@@ -210,7 +210,7 @@ def test_one_block(automax):
         (("--ticks", "4"), "--ticks is for --ki"),
         (("--tick-ms", "0.3"), "--tick-ms"),
         (("--ki", "1", "2", "--block", "100"), "--ki goes without --block and --set"),
-        (("--ki", "1", "2", "--ticks", "4"), "--ticks and FILE both tell the scan time"),
+        (("--ki", "1", "2", "--ticks", "4"), "--ticks and FILE both give the scan time"),
     ],
 )
 def test_wrong_usage(automax, options, told):

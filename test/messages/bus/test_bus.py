@@ -80,13 +80,13 @@ def known(**lives) -> Peers:
 
 def test_what_a_process_says_tells_whether_it_belongs_to_the_run():
     peers = known()
-    assert peers.heard(said(1), 0) is PresenceVerdict.OWN
-    assert peers.heard(said(), 0) is PresenceVerdict.NEW
-    assert peers.heard(said(), 1) is PresenceVerdict.KNOWN
-    assert peers.heard(said(6), 2) is PresenceVerdict.NEW
-    assert peers.heard(said(9, 3, run_id=43), 2) is PresenceVerdict.OTHER_RUN
-    assert peers.heard(said(9, 3, fingerprint=2), 2) is PresenceVerdict.OTHER_FILE
-    assert peers.heard(said(9, 5), 2) is PresenceVerdict.SLOT_TAKEN
+    assert peers.receive(said(1), 0) is PresenceVerdict.OWN
+    assert peers.receive(said(), 0) is PresenceVerdict.NEW
+    assert peers.receive(said(), 1) is PresenceVerdict.KNOWN
+    assert peers.receive(said(6), 2) is PresenceVerdict.NEW
+    assert peers.receive(said(9, 3, run_id=43), 2) is PresenceVerdict.OTHER_RUN
+    assert peers.receive(said(9, 3, fingerprint=2), 2) is PresenceVerdict.OTHER_FILE
+    assert peers.receive(said(9, 5), 2) is PresenceVerdict.SLOT_TAKEN
     assert [peer.process for peer in peers.running()] == [6]
     assert peers.of(6) is not None
     assert peers.of(9) is None
@@ -94,16 +94,16 @@ def test_what_a_process_says_tells_whether_it_belongs_to_the_run():
 
 def test_a_process_without_a_run_joins_the_one_that_it_hears_of():
     peers = Peers(1, 0, (0,), 1)
-    peers.heard(said(run_id=0), 0)
+    peers.receive(said(run_id=0), 0)
     assert peers.run_id == 0
-    peers.heard(said(run_id=42)._replace(epoch_ns=1000), 0)
+    peers.receive(said(run_id=42)._replace(epoch_ns=1000), 0)
     assert (peers.run_id, peers.epoch_ns) == (42, 1000)
 
 
 @pytest.mark.parametrize(("lives", "silence"), [(None, SILENCE_NS), (True, HUNG_NS)])
 def test_a_silent_process_is_lost(lives, silence):
     peers = known(lives=lambda _: lives)
-    peers.heard(said(), 0)
+    peers.receive(said(), 0)
     lost_at = None
     for now in range(0, 2 * HUNG_NS, BEAT):
         gone = peers.look(now)
@@ -113,19 +113,19 @@ def test_a_silent_process_is_lost(lives, silence):
     assert lost_at is not None
     assert silence < lost_at <= silence + BEAT
     assert peers.lost == {2}
-    assert peers.heard(said(), lost_at + 1) is PresenceVerdict.NEW
+    assert peers.receive(said(), lost_at + 1) is PresenceVerdict.NEW
     assert peers.lost == set()
 
 
 def test_a_process_that_has_ended_is_lost_at_the_next_look():
     peers = known(lives=lambda _: False)
-    peers.heard(said(), 0)
+    peers.receive(said(), 0)
     assert [peer.process for peer in peers.look(1)] == [5]
 
 
 def test_one_that_leaves_in_order_is_not_lost():
     peers = known(lives=lambda _: False)
-    peers.heard(said(state=Stage.LEAVING), 0)
+    peers.receive(said(state=Stage.LEAVING), 0)
     assert peers.look(BEAT) == []
     assert peers.by_slot == {}
     assert peers.lost == set()
@@ -133,16 +133,16 @@ def test_one_that_leaves_in_order_is_not_lost():
 
 def test_who_was_held_up_itself_judges_nobody_before_it_has_listened():
     peers = known()
-    peers.heard(said(), 0)
+    peers.receive(said(), 0)
     assert peers.look(0) == []
     assert peers.look(10 * SILENCE_NS) == []
-    peers.heard(said(), 10 * SILENCE_NS + 1)
+    peers.receive(said(), 10 * SILENCE_NS + 1)
     assert peers.look(10 * SILENCE_NS + BEAT) == []
 
 
 def test_batches_that_did_not_come_are_noticed():
     peers = known()
-    peers.heard(said(sequence=0), 0)
+    peers.receive(said(sequence=0), 0)
     peer = peers.of(5)
     assert peer is not None
     peer.got(1)
@@ -155,7 +155,7 @@ def test_batches_that_did_not_come_are_noticed():
     # It tells of batches that have not come: as long as they may wait here nothing is missing.
     for _ in range(100):
         word = said(sequence=6)
-        peers.heard(word, 0)
+        peers.receive(word, 0)
         assert peers.is_short(word)
     assert peers.owing() is None
     # All was taken that had come: DDS has time to send them again.
@@ -180,8 +180,8 @@ def test_batches_that_did_not_come_are_noticed():
 )
 def test_what_a_word_says_that_was_not_accepted_is_not_missed(word):
     peers = known()
-    peers.heard(said(sequence=0), 0)
-    peers.heard(word, 0)
+    peers.receive(said(sequence=0), 0)
+    peers.receive(word, 0)
     assert not peers.is_short(word)
     for now_ns in range(0, 2 * MISSING_NS, BEAT):
         peers.missed(word, now_ns)

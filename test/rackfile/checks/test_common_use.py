@@ -83,7 +83,7 @@ def test_two_writers(tmp_path, common, one, two, log):
 
 def test_what_is_read_and_never_written_is_named_with_its_reader(tmp_path):
     assert found(tmp_path, "A%: {}", "A%: OWN% = A%") == [
-        "AMX6496 9 A% is read in line 110 of ONE.BLK, and nobody writes it: it stays 0"
+        "AMX6496 9 A% is read in line 110 of ONE.BLK, and no task writes it: it stays 0"
     ]
     assert found(tmp_path, "A@: {}", "A@: CALL OR(INPUT1=A@, OUTPUT=OWN@)")[0].endswith("it stays FALSE")
 

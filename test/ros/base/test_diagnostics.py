@@ -152,7 +152,7 @@ def test_a_halted_rack_goes_on_telling_by_the_wall_clock(world) -> None:
     world.pacer.run(should_stop=lambda: world.wall.now_ns >= end_ns)
     assert world.instants == [0, 502, 502, 502, 502]
     for _, statuses in world.sent[1:]:
-        assert (statuses[0].level, statuses[0].message) == (b"\x01", "halted: rack time stands still")
+        assert (statuses[0].level, statuses[0].message) == (b"\x01", "halted: rack time is frozen")
     world.rack.adjust.set("NIL%", 1)
     halting.step("scan")
     end_ns = world.wall.now_ns + 300 * NS_PER_MS

@@ -36,7 +36,7 @@ def pacer(scans, jumps):
 
 
 def begun(pacer, at=EPOCH_NS):
-    pacer.heard(at)
+    pacer.follow_to(at)
     assert pacer.begin() == at
     pacer.step()
     return pacer
@@ -50,15 +50,15 @@ def test_nothing_happens_before_the_first_time(pacer, scans):
     assert not pacer.has_clock
     pacer.step()
     assert scans == []
-    pacer.heard(0)
+    pacer.follow_to(0)
     assert not pacer.has_clock
-    pacer.heard(EPOCH_NS)
+    pacer.follow_to(EPOCH_NS)
     assert pacer.has_clock
     assert scans == []
 
 
 def test_rack_begins_at_the_time_that_was_heard_last_and_carries_its_instant_out(pacer, scans):
-    pacer.heard(1)
+    pacer.follow_to(1)
     begun(pacer)
     assert scans == [(0, 0)]
     assert pacer.now_ns == 0
@@ -76,41 +76,41 @@ def test_events_up_to_and_at_each_time_have_happened_at_their_own_instants(steps
     passed = 0
     for step in steps:
         passed += step
-        pacer.heard(EPOCH_NS + passed)
+        pacer.follow_to(EPOCH_NS + passed)
         assert pacer.now_ns == passed
         assert scans == grid(passed + 1)
 
 
 def test_clock_that_goes_back_leaves_rack_time_where_it_is(pacer, scans, jumps):
     begun(pacer)
-    pacer.heard(EPOCH_NS + NS_PER_S)
-    pacer.heard(EPOCH_NS + 1)
+    pacer.follow_to(EPOCH_NS + NS_PER_S)
+    pacer.follow_to(EPOCH_NS + 1)
     assert pacer.now_ns == NS_PER_S
     assert jumps == [1 - NS_PER_S]
-    pacer.heard(EPOCH_NS + 1 + NS_PER_S)
+    pacer.follow_to(EPOCH_NS + 1 + NS_PER_S)
     assert pacer.now_ns == 2 * NS_PER_S
     assert scans == grid(2 * NS_PER_S + 1)
 
 
 def test_clock_that_leaps_ahead_leaves_the_time_between_out(pacer, scans, jumps):
     begun(pacer)
-    pacer.heard(EPOCH_NS + LONGEST_JUMP_NS)
+    pacer.follow_to(EPOCH_NS + LONGEST_JUMP_NS)
     assert jumps == []
-    pacer.heard(EPOCH_NS + 2 * LONGEST_JUMP_NS + 1)
+    pacer.follow_to(EPOCH_NS + 2 * LONGEST_JUMP_NS + 1)
     assert jumps == [LONGEST_JUMP_NS + 1]
     assert pacer.now_ns == LONGEST_JUMP_NS
-    pacer.heard(EPOCH_NS + 2 * LONGEST_JUMP_NS + 1 + PERIOD_NS)
+    pacer.follow_to(EPOCH_NS + 2 * LONGEST_JUMP_NS + 1 + PERIOD_NS)
     assert scans == grid(LONGEST_JUMP_NS + PERIOD_NS + 1)
 
 
 def test_run_ends_at_its_time_and_leaves_what_is_due_then(pacer, scans):
     begun(pacer)
     times = iter(range(EPOCH_NS, EPOCH_NS + NS_PER_S, 3 * NS_PER_MS))
-    pacer._wait = lambda _: pacer.heard(next(times))
+    pacer._wait = lambda _: pacer.follow_to(next(times))
     pacer.run(20 * NS_PER_MS)
     assert scans == grid(20 * NS_PER_MS)
     assert pacer.now_ns == 20 * NS_PER_MS
-    pacer.heard(EPOCH_NS + NS_PER_S)
+    pacer.follow_to(EPOCH_NS + NS_PER_S)
     assert pacer.now_ns == 20 * NS_PER_MS
 
 
@@ -140,13 +140,13 @@ def followed(config, step_ns, settings):
     """The log of a rack that follows a clock of some step, with settings by rack time."""
     rack, log = Rack(config), Log()
     pacer = FollowingPacer(rack.scheduler, lambda _: None)
-    pacer.heard(EPOCH_NS)
+    pacer.follow_to(EPOCH_NS)
     pacer.begin()
     rack.observe(log)
     rack.start()
     pacer.step()
     for at in range(0, 400 * NS_PER_MS + 1, step_ns):
-        pacer.heard(EPOCH_NS + at)
+        pacer.follow_to(EPOCH_NS + at)
         if at in settings:
             pacer.catch_up()
             rack.write("REF%", settings[at])

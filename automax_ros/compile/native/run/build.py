@@ -104,10 +104,10 @@ def build(text: str, compiler: Compiler, options: Sequence[str] = (), limit_s: f
         NotNative: the compiler fails, does not have enough memory, or takes longer than ``limit_s`` s.
     """
     command = [compiler.path, *FLAGS, *options, "-x", "c", "-", "-o", MADE, "-lm"]
-    made = run_compiler(command, compiler.search, text, limit_s).made
-    if made is None:
+    library = run_compiler(command, compiler.search, text, limit_s).library
+    if library is None:
         raise NotNative(f"{compiler.path} has written no library")
-    return made
+    return library
 
 
 def python_options() -> tuple[str, ...]:
@@ -130,5 +130,5 @@ def _stamp(path: str) -> tuple[int, int]:
 
 @lru_cache(maxsize=8)
 def _version(path: str, search: str, _: tuple[int, int], limit_s: float) -> str:
-    said = run_compiler([path, "--version"], search, limit_s=limit_s).said
-    return (said.splitlines() or [""])[0]
+    output = run_compiler([path, "--version"], search, limit_s=limit_s).output
+    return (output.splitlines() or [""])[0]

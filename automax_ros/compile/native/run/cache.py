@@ -89,7 +89,7 @@ class NativeCache:
 
     def _store(self, name: str, content: bytes) -> Path:
         place = self._place()
-        with _opened(place) as folder:
+        with _open_folder(place) as folder:
             try:
                 self._write(folder, name, content + _digest(name, content))
                 self._make_room(folder, name)
@@ -146,7 +146,7 @@ def _files(folder: int, now: float) -> Iterator[tuple[float, int, str]]:
 
 
 @contextlib.contextmanager
-def _opened(place: Path) -> Iterator[int]:
+def _open_folder(place: Path) -> Iterator[int]:
     """Open the folder after checking that only its owner can write it and its parents."""
     for above in place.parents:
         _require_safe_above(above)
@@ -185,7 +185,7 @@ def _require_safe_above(path: Path) -> None:
 
 def _content(path: Path) -> bytes | None:
     """Return the content of a file of the cache, None where it is missing or damaged; mark it as used."""
-    with _opened(path.parent) as folder:
+    with _open_folder(path.parent) as folder:
         try:
             file = os.open(path.name, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK, dir_fd=folder)
         except FileNotFoundError:
@@ -194,7 +194,7 @@ def _content(path: Path) -> bytes | None:
             raise NotNative(_unusable(path, error.strerror or str(error))) from error
         try:
             _require_own(os.fstat(file), path, stat.S_ISREG)
-            content = _undamaged(file, path.name)
+            content = _verify(file, path.name)
             if content is not None:
                 with contextlib.suppress(OSError):
                     os.utime(file)
@@ -208,7 +208,7 @@ def _digest(name: str, content: bytes) -> bytes:
     return hashlib.sha256(name.encode() + b"\0" + content).digest()
 
 
-def _undamaged(file: int, name: str) -> bytes | None:
+def _verify(file: int, name: str) -> bytes | None:
     with os.fdopen(os.dup(file), "rb") as stream:
         stored = stream.read()
     content = stored[:-_DIGEST]

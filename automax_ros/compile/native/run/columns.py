@@ -114,7 +114,7 @@ class Columns:
         Raises:
             ValueError: the columns do not fit the task or the count.
         """
-        columns = self._checked(latched, count)
+        columns = self._check(latched, count)
         _require_rows(actual, count)
         try:
             before = self._slots.taken(state)
@@ -142,7 +142,7 @@ class Columns:
             slots[:] = kept
             room *= 8
 
-    def _checked(self, latched: Sequence[Column], count: int) -> list[Column]:
+    def _check(self, latched: Sequence[Column], count: int) -> list[Column]:
         if len(latched) != len(self._kinds):
             raise ValueError(f"{len(latched)} columns where the task latches {len(self._kinds)} commons")
         columns: list[Column] = []

@@ -81,8 +81,8 @@ _ABANDONED: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
 class Ran:
     """The output of a compiler, and the library that it has made, None if it made none."""
 
-    said: str
-    made: bytes | None
+    output: str
+    library: bytes | None
 
 
 def run_compiler(command: Sequence[str], search: str, text: str = "", limit_s: float = LIMIT_S) -> Ran:
@@ -100,12 +100,12 @@ def run_compiler(command: Sequence[str], search: str, text: str = "", limit_s: f
         NotNative: it cannot be run, fails, does not have enough memory, or takes longer.
     """
     memory = memory_of(text)
-    with _begun(command, search, text, limit_s, memory) as (process, folder, life):
-        said, complaints = _awaited(process, life, command[0], limit_s)
+    with _running_compiler(command, search, text, limit_s, memory) as (process, folder, life):
+        output, complaints = _wait_for_output(process, life, command[0], limit_s)
         if process.returncode:
             raise NotNative(_failure(command[0], process.returncode, complaints, memory))
-        made = folder / MADE
-        return Ran(said, made.read_bytes() if made.is_file() else None)
+        library = folder / MADE
+        return Ran(output, library.read_bytes() if library.is_file() else None)
 
 
 def memory_of(text: str) -> int:
@@ -127,7 +127,7 @@ def abandon(threads: Iterable[threading.Thread]) -> None:
 
 
 @contextlib.contextmanager
-def _begun(
+def _running_compiler(
     command: Sequence[str], search: str, text: str, limit_s: float, memory: int
 ) -> Iterator[tuple[subprocess.Popen[str], Path, io.FileIO]]:
     """Start a compiler in its own folder; yield its process, the folder, and the pipe whose closing ends it."""
@@ -168,13 +168,13 @@ def _clear_away(new: Path) -> None:
                         shutil.rmtree(entry.path, ignore_errors=True)
 
 
-def _awaited(process: subprocess.Popen[str], life: io.FileIO, name: str, limit_s: float) -> tuple[str, str]:
+def _wait_for_output(process: subprocess.Popen[str], life: io.FileIO, name: str, limit_s: float) -> tuple[str, str]:
     """Return a compiler's output and error output. The processes that it has started end with it."""
     thread = _RUNNING[life] = threading.current_thread()
     try:
         if thread in _ABANDONED:
             life.close()
-        return _printed(process, limit_s)
+        return _read_output(process, limit_s)
     except BaseException as error:
         if process.returncode is None:  # else another process may have its number by now
             with contextlib.suppress(ProcessLookupError):
@@ -190,7 +190,7 @@ def _awaited(process: subprocess.Popen[str], life: io.FileIO, name: str, limit_s
         del _RUNNING[life]
 
 
-def _printed(process: subprocess.Popen[str], limit_s: float) -> tuple[str, str]:
+def _read_output(process: subprocess.Popen[str], limit_s: float) -> tuple[str, str]:
     """Return the output and error output of a process.
 
     Raises:
@@ -208,5 +208,5 @@ def _failure(name: str, code: int, complaints: str, memory: int) -> str:
         return f"{name} has not enough memory for it, of which it may have {memory >> 20:,} MB: divide the task"
     if code in _NOT_RUN:
         return f"{name} cannot be run: {lines[-1][:_MESSAGE]}"
-    told = next((line for line in lines if "error" in line), lines[0])
-    return f"{name} fails: {told[:_MESSAGE]}"
+    shown = next((line for line in lines if "error" in line), lines[0])
+    return f"{name} fails: {shown[:_MESSAGE]}"

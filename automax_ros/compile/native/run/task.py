@@ -69,7 +69,7 @@ def translation_key(compiled: CompiledTask, form: Form) -> str:
         *_TRANSLATOR,
         program.name,
         ast.dump(form.function, include_attributes=True),
-        *(f"{name} {_described(item)}" for name, item in sorted(form.known.items())),
+        *(f"{name} {_describe(item)}" for name, item in sorted(form.known.items())),
         sorted(form.views.items()),
         symbols,
         compiled.layout.fields,
@@ -79,7 +79,7 @@ def translation_key(compiled: CompiledTask, form: Form) -> str:
     return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()
 
 
-def _described(item: object) -> str:
+def _describe(item: object) -> str:
     """Return a description of a global of generated code; a function is described by its own name in the sources."""
     if isinstance(item, CoefficientFunction):
         return repr((item.block.name, item.period_s, sorted(item.literals.items()), item.evaluated))

@@ -55,15 +55,15 @@ def called(frame: Frame, function: object, node: ast.Call, known: Environment) -
         return carry_out(frame, arguments)
     if isinstance(function, CoefficientFunction):
         arguments = [as_real(item) for item in arguments]
-        return _translated(frame, frame.unit.tree(function, coefficient_tree), FORMULAS, arguments)
+        return _translate(frame, frame.unit.tree(function, coefficient_tree), FORMULAS, arguments)
     if not isinstance(function, FunctionType):
         raise NotNative(f"a call of {function!r}")
     missing = function.__code__.co_argcount - len(arguments)
     arguments = [*arguments, *map(literal, (function.__defaults__ or ())[-missing:] if missing else ())]
-    return _translated(frame, _parsed(function), function.__globals__, arguments)
+    return _translate(frame, _parse(function), function.__globals__, arguments)
 
 
-def _translated(
+def _translate(
     frame: Frame, parsed: ast.FunctionDef, scope: Mapping[str, object], arguments: list[Typed]
 ) -> list[Typed]:
     parameters = [argument.arg for argument in parsed.args.args]
@@ -76,12 +76,12 @@ def _translated(
         general = exact
     if [c_type(item) for item in _results(general)] != [c_type(item) for item in results]:
         general = exact
-    name = _defined(general, parsed.name, parameters, [item.range for item in arguments])
-    return _delivered(frame, name, [bare(item.text) for item in arguments], results, can_end=general.can_end)
+    name = _define(general, parsed.name, parameters, [item.range for item in arguments])
+    return _deliver(frame, name, [bare(item.text) for item in arguments], results, can_end=general.can_end)
 
 
 @cache
-def _parsed(function: FunctionType) -> ast.FunctionDef:
+def _parse(function: FunctionType) -> ast.FunctionDef:
     parsed = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
     if not isinstance(parsed, ast.FunctionDef):
         raise NotNative(f"a call of {function.__name__}")
@@ -137,7 +137,7 @@ def _results(made: Frame) -> list[Range]:
     return [span(items) for items in zip(*made.returned, strict=True)]
 
 
-def _defined(made: Frame, name: str, parameters: list[str], ranges: list[Range]) -> str:
+def _define(made: Frame, name: str, parameters: list[str], ranges: list[Range]) -> str:
     results = [c_type(item) for item in _results(made)]
     given = [f"{c_type(item)} {parameter}" for parameter, item in zip(parameters, ranges, strict=True)]
     given += [f"{kind} *result_{number}" for number, kind in enumerate(results[1:], 1)]
@@ -148,7 +148,7 @@ def _defined(made: Frame, name: str, parameters: list[str], ranges: list[Range])
     return made.unit.function(name, head, "".join(declared) + "\n".join(made.lines) + "\n}")
 
 
-def _delivered(frame: Frame, name: str, texts: list[str], results: list[Range], *, can_end: bool) -> list[Typed]:
+def _deliver(frame: Frame, name: str, texts: list[str], results: list[Range], *, can_end: bool) -> list[Typed]:
     """Return a call whose second and further results are returned by pointers."""
     others = [Typed(frame.temporary(item), item) for item in results[1:]]
     arguments = [*texts, *(f"&{item.text}" for item in others)]
@@ -223,7 +223,7 @@ def _stored_real(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     ]
     # NaN becomes 0
     result = Range(Kind.REAL, min(0.0, stored[0]), max(0.0, stored[1]), never_nan=True)
-    return _delivered(frame, "stored_real", [bare(item.text)], [result, ANY_BOOL], can_end=False)
+    return _deliver(frame, "stored_real", [bare(item.text)], [result, ANY_BOOL], can_end=False)
 
 
 def _data_value(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
@@ -240,16 +240,16 @@ def _data_value(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]
 def _integer_power(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     texts = [bare(item.whole.text) for item in arguments]
     results = [Range(Kind.INT, INT32_MIN, INT32_MAX), Range(Kind.INT, 0, functions.DIVISION_BY_ZERO)]
-    return _delivered(frame, "integer_power", texts, results, can_end=False)
+    return _deliver(frame, "integer_power", texts, results, can_end=False)
 
 
 def _real_power(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     texts = [bare(as_real(item).text) for item in arguments]
     results = [ANY_REAL, Range(Kind.INT, 0, functions.BAD_ARGUMENT)]
-    return _delivered(frame, "real_power", texts, results, can_end=False)
+    return _deliver(frame, "real_power", texts, results, can_end=False)
 
 
-def _raised(frame: Frame, arguments: list[Typed]) -> list[Typed]:
+def _call_raised(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     base, exponent = (bare(as_real(item).text) for item in arguments)
     return [Typed(f"raised({base}, {exponent}, {frame.ended()})", ANY_REAL)]
 
@@ -275,6 +275,6 @@ _BUILTINS: dict[object, Carry] = {
     functions.store_real: _stored_real,
     functions.integer_power: _integer_power,
     functions.real_power: _real_power,
-    raised: _raised,
+    raised: _call_raised,
 }
 """The translation of each function that is not translated from its Python."""

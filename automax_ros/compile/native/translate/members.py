@@ -75,7 +75,7 @@ def _plain(function: str) -> Member:
     return lambda frame, _, __: [Typed(f"{function}(host, {frame.ended()})", ANY_BOOL)]
 
 
-def _refused(what: str) -> Member:
+def _refuse_member(what: str) -> Member:
     def refuse(_: Frame, __: ast.Call, ___: Environment) -> list[Typed]:
         raise NotNative(what)
 
@@ -107,7 +107,7 @@ _MEMBERS: dict[str, Member] = {
     "clear_errors": _plain("clear_errors"),
     "io_read": _io_read,
     "io_write": _io_write,
-    "print_line": _refused("PRINT"),
-    "set_event": _refused("SET of an event"),
-    "minor_loop": _refused("the current minor loop of a drive"),
+    "print_line": _refuse_member("PRINT"),
+    "set_event": _refuse_member("SET of an event"),
+    "minor_loop": _refuse_member("the current minor loop of a drive"),
 }

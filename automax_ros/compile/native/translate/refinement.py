@@ -42,7 +42,7 @@ def refined(frame: Frame, test: ast.expr, known: Environment, *, truth: bool) ->
     if isinstance(test, ast.BoolOp):
         return _all_of(frame, test, known) if isinstance(test.op, ast.And) is truth else _one_of(frame, test, known)
     if isinstance(test, ast.Compare):
-        return _compared(frame, test, known, truth=truth)
+        return _compare(frame, test, known, truth=truth)
     return known
 
 
@@ -80,7 +80,7 @@ def _one_of(frame: Frame, test: ast.BoolOp, known: Environment) -> Environment |
     return found
 
 
-def _compared(frame: Frame, test: ast.Compare, known: Environment, *, truth: bool) -> Environment | None:
+def _compare(frame: Frame, test: ast.Compare, known: Environment, *, truth: bool) -> Environment | None:
     operands = [test.left, *test.comparators]
     pairs = list(zip(operands, test.ops, operands[1:], strict=False))
     if len(pairs) > 1 and not truth:
@@ -89,14 +89,14 @@ def _compared(frame: Frame, test: ast.Compare, known: Environment, *, truth: boo
     for left, sign, right in pairs:
         relation = type(sign) if truth else _OPPOSITE[type(sign)]
         for subject, seen, other in ((left, relation, right), (right, _MIRRORED[relation], left)):
-            after = _bounded(frame, subject, seen, other, known, truth=truth)
+            after = _bound(frame, subject, seen, other, known, truth=truth)
             if after is None:
                 return None
             known = after
     return known
 
 
-def _bounded(
+def _bound(
     frame: Frame, subject: ast.expr, relation: type[ast.cmpop], other: ast.expr, known: Environment, *, truth: bool
 ) -> Environment | None:
     """Return the known ranges where ``subject relation other`` is true; the subject may be a name or a negated name.

@@ -63,7 +63,7 @@ class Repeated:
         frame.locals.update(came.locals)
         frame.touched |= came.touched
         frame.temporaries, frame.asks_end = came.temporaries, came.asks_end
-        return _changed(known, came.changes)
+        return _apply_changes(known, came.changes)
 
     def _carry_out(
         self, statement: ast.stmt, known: Environment, found: tuple[object, ...], carry_out: CarryOut
@@ -93,7 +93,7 @@ class Repeated:
         return self._names[key]
 
 
-def _changed(known: Environment, changes: list[tuple[str, Range | None]]) -> Environment:
+def _apply_changes(known: Environment, changes: list[tuple[str, Range | None]]) -> Environment:
     if not changes:
         return known
     after = known.without({name for name, left in changes if left is None})
@@ -111,10 +111,10 @@ class ScanBody(Body):
         self._latched, self._written = latched, written
         self._repeated = Repeated(frame, frozenset({CHANGES}))
 
-    def _one(self, statement: ast.stmt, known: Environment) -> Environment | None:
+    def _carry_out_one(self, statement: ast.stmt, known: Environment) -> Environment | None:
         if self._depth > 1:
-            return super()._one(statement, known)
-        return self._repeated.carried_out(statement, known, super()._one)
+            return super()._carry_out_one(statement, known)
+        return self._repeated.carried_out(statement, known, super()._carry_out_one)
 
     def _assign(self, statement: ast.Assign, known: Environment) -> Environment:
         target, value = statement.targets[0], statement.value

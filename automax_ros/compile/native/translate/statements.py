@@ -48,7 +48,7 @@ class Body:
             if known is None:
                 return None
             try:
-                known = self._one(statement, known)
+                known = self._carry_out_one(statement, known)
             except NotNative as error:
                 if error.line:
                     raise
@@ -89,7 +89,7 @@ class Body:
             known = known.setting(name, Range(declared.kind, low, high))
         return known
 
-    def _one(self, statement: ast.stmt, known: Environment) -> Environment | None:
+    def _carry_out_one(self, statement: ast.stmt, known: Environment) -> Environment | None:
         carry_out = self._statements.get(type(statement))
         if carry_out is None:
             raise NotNative(f"a statement of the kind {type(statement).__name__}")
@@ -114,7 +114,7 @@ class Body:
     def _assign_all(self, targets: ast.Tuple, value: ast.expr, known: Environment) -> None:
         if isinstance(value, ast.Tuple):
             results = [self.frame.value(item, known) for item in value.elts]
-            results = [self._kept(item) for item in results]
+            results = [self._keep(item) for item in results]
         elif isinstance(value, ast.Call):
             results = self.frame.call(value, known)
         else:
@@ -122,7 +122,7 @@ class Body:
         for target, result in zip(targets.elts, results, strict=True):
             self._assign_one(target, result, known)
 
-    def _kept(self, item: Typed) -> Typed:
+    def _keep(self, item: Typed) -> Typed:
         """Return a value in a separate local: names in it are about to change."""
         name = self.frame.temporary(item.range)
         self.frame.emit(f"{name} = {bare(item.text)};")
@@ -185,7 +185,7 @@ class Body:
         test = self.frame.value(node, known)
         if not self.frame.asks_end:
             return test.text
-        kept = self._kept(test)
+        kept = self._keep(test)
         self.asked()
         return kept.text
 
@@ -271,7 +271,7 @@ class Body:
             return
         if isinstance(value, ast.Call):
             first, *others = self.frame.call(value, known)
-            self._deliver([self._kept(first) if others else first, *others])  # the call sets the others
+            self._deliver([self._keep(first) if others else first, *others])  # the call sets the others
             return
         nodes = value.elts if isinstance(value, ast.Tuple) else [value]
         self._deliver([self.frame.value(node, known) for node in nodes if node is not None])

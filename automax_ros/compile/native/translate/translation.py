@@ -118,7 +118,7 @@ class _Translation:
             grown = [name for name in fields if not known[name].holds(after[name])]
             if not grown and not self._frame.has_grown:
                 return known
-            wider = {name: self._grown(name, fields[name], known[name].widened(after[name])) for name in grown}
+            wider = {name: self._grow(name, fields[name], known[name].widened(after[name])) for name in grown}
             known = Environment({**dict(known.items()), **wider})
         raise NotNative("a state that has no bounds")
 
@@ -130,7 +130,7 @@ class _Translation:
         back = " ".join(f"s->{name} = (int64_t){place};" for name, place in wide.items())
         return [_RETURN.sub(rf"{{ {back} return \1; }}", line) for line in self._frame.lines]
 
-    def _grown(self, name: str, field: StateField, known: Range) -> Range:
+    def _grow(self, name: str, field: StateField, known: Range) -> Range:
         """Return the range of a field as found so far; the integers of blocks have bounds."""
         if field.role in _VARIABLES or known.kind is None:
             raise NotNative(f"{field.name} may be left with a value beyond its type")

@@ -63,7 +63,7 @@ def _checked_input(
     if literal is not None:
         _check_literal(context, parameter, kind, literal, value)
         return literal
-    variable = _inverted(value) if kind is DataType.BOOLEAN else None
+    variable = _inverted_variable(value) if kind is DataType.BOOLEAN else None
     if variable is None and isinstance(value, (tree.Reference, tree.Element)):
         variable = value
     if variable is None:
@@ -80,7 +80,7 @@ def _checked_output(context: Context, block: Block, parameter: Output, argument:
     value = argument.value
     if literal_of(value) is not None:
         context.report("AMX4078", f"the output {parameter.name} needs a variable, not a constant", value.span)
-    elif _inverted(value) is not None:
+    elif _inverted_variable(value) is not None:
         hint = "a boolean is inverted where it is used as an input"
         context.report("AMX4079", f"the output {parameter.name} cannot be inverted", value.span, hint)
     elif not isinstance(value, (tree.Reference, tree.Element)):
@@ -194,7 +194,7 @@ def _report_expression(context: Context, parameter: Input | Output, kind: object
     context.report("AMX4077", f"{parameter.name} takes {what}, no expression", value.span, hint)
 
 
-def _inverted(value: Expression) -> tree.Reference | tree.Element | None:
+def _inverted_variable(value: Expression) -> tree.Reference | tree.Element | None:
     """Return the boolean variable of ``-NAME@``, None where the value is something else."""
     if not isinstance(value, tree.Unary) or value.operator != "-":
         return None

@@ -39,7 +39,7 @@ def find_files(context: Context, layout: TaskLayout) -> None:
         if not isinstance(statement, (tree.OpenChannel, tree.OpenPort)):
             continue
         context.line = line
-        opened = _opened(statement)
+        opened = _opened_file(statement)
         known = context.files.setdefault(statement.file, opened)
         place = first.setdefault(statement.file, statement.span)
         if known != opened:
@@ -50,7 +50,7 @@ def find_files(context: Context, layout: TaskLayout) -> None:
             context.report("AMX4114", message, statement.span, "take another number", (note,))
 
 
-def _opened(statement: tree.OpenChannel | tree.OpenPort) -> OpenedFile:
+def _opened_file(statement: tree.OpenChannel | tree.OpenPort) -> OpenedFile:
     if isinstance(statement, tree.OpenPort):
         return OpenedFile(statement.file, statement.port.upper())
     return OpenedFile(statement.file, "", statement.direction, statement.types)

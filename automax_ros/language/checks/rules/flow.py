@@ -70,7 +70,7 @@ def _collect(layout: TaskLayout) -> tuple[dict[int, Place], list[Jump]]:
     parts = ((Region.STARTUP, layout.startup, None), (Region.SCAN, layout.scan, layout.scan_loop_line))
     for region, part, first_line in parts:
         line = first_line
-        for statement, blocks in _placed(part, ()):
+        for statement, blocks in _place_statements(part, ()):
             place = Place(region, blocks, statement)
             if statement.number is not None:
                 line = statement.number
@@ -79,13 +79,13 @@ def _collect(layout: TaskLayout) -> tuple[dict[int, Place], list[Jump]]:
     return places, jumps
 
 
-def _placed(
+def _place_statements(
     statements: tuple[tree.Statement, ...], blocks: tuple[int, ...]
 ) -> Iterator[tuple[tree.Statement, tuple[int, ...]]]:
     for statement in statements:
         yield statement, blocks
         for body in bodies(statement):
-            yield from _placed(body, (*blocks, id(body)))
+            yield from _place_statements(body, (*blocks, id(body)))
 
 
 def _targets(statement: tree.Statement) -> list[tuple[int, str]]:

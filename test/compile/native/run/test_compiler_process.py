@@ -54,7 +54,7 @@ def test_a_compiler_and_what_it_starts_may_have_so_much_and_no_more(tmp_path, te
     limits = "ulimit -v; ulimit -t; ulimit -c; ulimit -f"
     path = compiler_of(tmp_path, f"{{ {limits}; sh -c '{limits}'; pwd; cat; }} > {told}")
     text = "int x;\n" * 1000
-    assert run_compiler([str(path)], os.environ["PATH"], text, 20.0).made is None
+    assert run_compiler([str(path)], os.environ["PATH"], text, 20.0).library is None
     *numbers, folder, read = told.read_text().split("\n", 9)
     blocks = [int(numbers.pop(place)) for place in (7, 3)]
     assert blocks in ([FILE_BLOCKS] * 2, [2 * FILE_BLOCKS] * 2)  # bash by this name counts blocks of 1024 bytes
@@ -142,7 +142,7 @@ def test_words_are_passed_on_as_they_are(tmp_path):
     path = tmp_path / "its $PATH; exit 1"
     path.mkdir()
     compiler = compiler_of(path, "printf '%s\\n' \"$@\"")
-    assert run_compiler([str(compiler), *words], os.environ["PATH"]).said.split("\n") == [*words, ""]
+    assert run_compiler([str(compiler), *words], os.environ["PATH"]).output.split("\n") == [*words, ""]
 
 
 def test_what_a_killed_process_has_left_is_cleared_away(temporary, monkeypatch):
@@ -222,7 +222,7 @@ def test_what_is_abandoned_takes_no_other_thread_s_compiler_along(tmp_path):
         folder.mkdir()
         path = begun_compiler_of(folder, ending)
         with contextlib.suppress(NotNative):
-            said.append(run_compiler([str(path)], os.environ["PATH"]).said)
+            said.append(run_compiler([str(path)], os.environ["PATH"]).output)
 
     threads = []
     for name, ending in (("first", "exec sleep 1000"), ("second", f"cat {goes_on}")):
