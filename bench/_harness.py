@@ -16,8 +16,10 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText, render_all
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.language.checks.checker import check
 from automax_ros.language.tree.tree import Scope
+from automax_ros.rack.rack import Rack
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.views import ViewSpec
 from automax_ros.runtime.tasks.task import Task
@@ -37,6 +39,11 @@ class Loop(NamedTuple):
     rest: Callable[[], object]
     """Its time is subtracted."""
     passes: int
+
+
+def scans_per_second(rack: Rack) -> float:
+    """Return how many scans the rack's tasks execute per second of rack time."""
+    return sum(NS_PER_S / task.period_ns for task in rack.tasks if task.period_ns)
 
 
 def task_of(text: str, target: Platform = Platform.AUTOMAX) -> tuple[Task, CommonMemory]:

@@ -8,7 +8,7 @@ import timeit
 from collections.abc import Callable
 from pathlib import Path
 
-from _harness import seconds_in_turn
+from _harness import scans_per_second, seconds_in_turn
 
 from automax_ros.core.types import DataType
 from automax_ros.messages.cdr.cdr import Message, decoder, encoder
@@ -28,7 +28,7 @@ from automax_ros.messages.types.messages import (
     VariableTable,
 )
 from automax_ros.messages.types.topics import LATCHED, SCAN
-from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.tables.export import CommonTable, write_csv

@@ -13,13 +13,13 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from _harness import ANSWER, Other, answer, seconds_in_turn, wall_s
+from _harness import ANSWER, Other, answer, scans_per_second, seconds_in_turn, wall_s
 
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms, NativeMode
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.parallel.job import Workers
-from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig, Timing
 from automax_ros.recordings.write.recorder import Recorder

@@ -8,14 +8,14 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from _harness import seconds_in_turn, wall_s
+from _harness import scans_per_second, seconds_in_turn, wall_s
 
 from automax_ros.compile.native.run.forms import NativeForms, NativeMode
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.parallel.job import Workers
-from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.recordings.write.recorder import Recorder, RecordingOptions

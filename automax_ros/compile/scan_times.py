@@ -130,7 +130,12 @@ def _either(ways: _Ways, *names: _Way) -> Span | None:
 
 def _subroutines(program: Program, model: CostModel, inner: dict[int, _Ways]) -> dict[int, _Ways]:
     """Return the exits of each subroutine, where those that it calls have the exits ``inner``."""
-    called = _called_lines(program.scan)
+    called = {
+        line
+        for item, _ in statements_in_order(program.scan)
+        if isinstance(item, Gosub) or (isinstance(item, OnJump) and item.gosub)
+        for line in jumps_of(item)
+    }
     if not called:
         return {}
     edges = _Suite(program, model, inner, inside=True).edges(program.scan)
@@ -143,14 +148,6 @@ def _to_the_end(ways: _Ways) -> _Ways:
     end = _either(ways, _Way.NEXT, _Way.END)
     rest = {way: span for way, span in ways.items() if way not in (_Way.NEXT, _Way.END)}
     return rest if end is None else {**rest, _Way.END: end}
-
-
-def _called_lines(statements: tuple[Statement, ...]) -> frozenset[int]:
-    return frozenset(line for item, _ in statements_in_order(statements) if _calls(item) for line in jumps_of(item))
-
-
-def _calls(statement: Statement) -> bool:
-    return isinstance(statement, Gosub) or (isinstance(statement, OnJump) and statement.gosub)
 
 
 @dataclass(frozen=True)

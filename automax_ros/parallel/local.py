@@ -159,7 +159,8 @@ def _take_from(
             todo.appendleft((number, tries + 1))
         else:
             piece = pieces[number]
-            take(number, JobResult(piece, fault=death_of(piece.name, f"its process has died ({_ending(code)})")))
+            ending = f"signal {-code}" if code < 0 else f"exit code {code}"
+            take(number, JobResult(piece, fault=death_of(piece.name, f"its process has died ({ending})")))
         if todo:
             _Worker(workers)
         return
@@ -193,10 +194,6 @@ class _Worker:
         code = self._kill()
         self.end.close()
         return code
-
-
-def _ending(code: int) -> str:
-    return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
 def work(end: Connection) -> None:

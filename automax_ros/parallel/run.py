@@ -38,16 +38,12 @@ def run_jobs(
 
         on_cluster(pieces, where.scheduler, take, should_stop)
     elif where.processes == 1:
-        _here(pieces, take, should_stop)
+        for number, piece in enumerate(pieces):
+            if should_stop():
+                break
+            take(number, result_of(piece))
     else:
         from automax_ros.parallel.local import in_processes
 
         in_processes(pieces, min(where.processes, len(pieces)), take, should_stop)
     return [done[number] for number in sorted(done)]
-
-
-def _here(pieces: Sequence[Job], take: Callable[[int, JobResult], None], should_stop: Callable[[], bool]) -> None:
-    for number, piece in enumerate(pieces):
-        if should_stop():
-            return
-        take(number, result_of(piece))

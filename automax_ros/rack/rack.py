@@ -17,7 +17,7 @@ from typing import Any
 from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.names import Element, NameFault
-from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.drive.base.state import SavedState
 from automax_ros.rack.base.local_names import LocalElement
@@ -448,8 +448,3 @@ class Rack:
 
     def _stop_all(self, reason: str, code: str | None, task: str) -> None:
         self.operations.stop_all(reason, code, task)
-
-
-def scans_per_second(rack: Rack) -> float:
-    """Return how many scans the rack's tasks execute per second of rack time."""
-    return sum(NS_PER_S / task.period_ns for task in rack.tasks if task.period_ns)

@@ -121,7 +121,7 @@ class SlotReader:
         kind = SUPPORTED[model]
         placed = self._placed[slot] = PlacedModule(slot, model, kind, key.span)
         known, what = ("module", *kind.options), _describe(placed)
-        section = Section(node.entries, what, known, self._findings, owner=f"{what} in slot {slot}")
+        section = Section(node, what, known, self._findings, owner=f"{what} in slot {slot}")
         return kind.read(ModuleSection(slot, model, section, key.span, self._tasks, self._executive, self._plants))
 
     def _model(self, entries: tuple[Entry, ...], what: str, key: Scalar) -> str | None:
@@ -268,11 +268,10 @@ def _text_of(path: Path, findings: ProblemList) -> str:
 
 
 def _read_rack(root: Node, text: str, tasks: TaskReader, path: Path, findings: ProblemList) -> RackConfig | None:
-    entries = entries_of(root, "a rack file", findings)
-    if entries is None:
+    section = Section(root, "a rack file", KEYS, findings, owner="")
+    if not section.well_formed:
         return None
-    section = Section(entries, "a rack file", KEYS, findings, owner="")
-    section.require(_REQUIRED, "the rack file", _START, findings)
+    section.require(_REQUIRED, "the rack file", _START)
     name = section.read(_NAME)
     operator, auto_run = bool(section.read(_OPERATOR)), bool(section.read(_AUTO_RUN))
     loss = section.read(_MODULE_LOSS) or ModuleLoss.STOP_ALL

@@ -98,7 +98,8 @@ def begun(replay: Replay, first: int) -> tuple[Totals, CarriedState]:
     run = replay.begin({}, replay.options)
     if first:
         run.take_up_to_scan(replay.reader.part(first, len(replay.reader.files)))
-    return run.totals() if first else _nothing(run.totals()), run.carried()
+    # Without notes, so that those at the beginning of the first part count as its own.
+    return run.totals() if first else run.totals().forgetting_notes(), run.carried()
 
 
 def scanning(run: Run, counted: Totals) -> tuple[frozenset[str], frozenset[str]]:
@@ -119,11 +120,6 @@ def _run(replay: Replay, part: Part) -> Run:
     if not part.first:
         starts = replay.starts(replay.reader.part(0, part.end), replay.options)
     return replay.begin(starts, replay.options)
-
-
-def _nothing(totals: Totals) -> Totals:
-    """Return totals without notes, so that the notes at the beginning of the first part count as its own."""
-    return totals.forgetting_notes()
 
 
 @lru_cache(maxsize=1)

@@ -328,7 +328,8 @@ class Stepper:
             if self._execution.advance() or self._follows():
                 return self._halt(Why.CHANGE if self._read() != before else Why.DONE, before)
             return self._halt(Why.STOPPED if self.rack.operations.stopped else Why.DONE, before)
-        items = [self._steppable(self._running(task).name)] if task else list(self._all_steppable())
+        names = [self._running(task).name] if task else [item.name for item in self.rack.scheduled]
+        items = [self._steppable(name) for name in names]
         try:
             self._hold({item.name: item for item in items})
             self._at_once = "every line"
@@ -406,6 +407,3 @@ class Stepper:
                 "scans of modeled execution cannot be held at a line: higher priorities go on meanwhile", hint
             )
         return item
-
-    def _all_steppable(self) -> list[ScheduledTask]:
-        return [self._steppable(item.name) for item in self.rack.scheduled]

@@ -15,7 +15,7 @@ from automax_ros.core.ticks import exact_ns, seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number
-from automax_ros.rackfile.model.config import CommonVariable, RackConfig
+from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.sweep import functions
 from automax_ros.sweep.functions import Accumulator
 
@@ -212,13 +212,10 @@ def _subject(function: Function, name: str, text: str, config: RackConfig) -> st
             raise UserError(f"the rack has no task {quoted(text)}", near_or_listed(text.upper(), tasks))
         return text.upper()
     meant = config.common(text)
-    if not _fits(meant.variable, function.subject):
-        raise UserError(f"{name} is of {function.subject.value}; {meant.label} is a {meant.variable.type.word}")
+    kind = meant.variable.type
+    if not (kind is DataType.BOOLEAN if function.subject is Subject.BOOLEAN else kind.is_numeric):
+        raise UserError(f"{name} is of {function.subject.value}; {meant.label} is a {kind.word}")
     return meant.label
-
-
-def _fits(variable: CommonVariable, subject: Subject) -> bool:
-    return variable.type is DataType.BOOLEAN if subject is Subject.BOOLEAN else variable.type.is_numeric
 
 
 def _number_text(value: float) -> str:

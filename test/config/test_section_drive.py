@@ -8,7 +8,7 @@ import pytest
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value, bare_name
-from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.ros_names import set_topic
@@ -99,10 +99,6 @@ def test_it_uses_as_many_blocks_as_the_readme_says(config):
     used = {call.block.name for _, _, result in check_tasks(config) for call in result.program.calls.values()}
     assert "The 15 blocks used" in README
     assert len(used) == 15
-
-
-def test_scan_rate_is_that_of_a_small_rack(config):
-    assert scans_per_second(Rack(config)) == pytest.approx(3 / SCAN_S + 1 / SEQUENCE_SCAN_S)
 
 
 def test_readme_names_only_what_exists(config):

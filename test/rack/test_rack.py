@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from automax_ros.core.kinds import WriteKind, WriterKind
-from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER, PRESET_WRITER, ROS_WRITER
 from automax_ros.runtime.memory.views import MemoryValueError
@@ -122,10 +122,6 @@ def test_tasks_start_by_priority_then_name_and_keep_their_periods(build):
     ]
     rack.run(0.0001)
     assert rack.value("ORDER!") == 232_23
-
-
-def test_scans_per_second(build):
-    assert scans_per_second(build()) == pytest.approx(1 / 0.011 + 1 / 0.022 + 1 / 0.010)
 
 
 def test_presets_then_settings_then_the_part_before_scan_loop(build):

@@ -52,16 +52,12 @@ def press(
             else:
                 found.append((call, set_to))
                 pressed += [(call, set_to)] if set_to.ok else []
-        _hold(given.held if pressed else 0, should_stop)
+        end_ns = time.monotonic_ns() + (given.held if pressed else 0)
+        while (left := end_ns - time.monotonic_ns()) > 0 and not should_stop():
+            time.sleep(min(_LOOK_S, left / NS_PER_S))
     finally:
         for call, _ in pressed:
             released = answer(replace(call, fields={**call.fields, "value": "FALSE"}), given.timeout)
             if not released.ok:
                 found = [item if item[0] is not call else (call, released) for item in found]
     return found
-
-
-def _hold(time_ns: int, should_stop: Callable[[], bool]) -> None:
-    end_ns = time.monotonic_ns() + time_ns
-    while (left := end_ns - time.monotonic_ns()) > 0 and not should_stop():
-        time.sleep(min(_LOOK_S, left / NS_PER_S))

@@ -11,19 +11,17 @@ from automax_ros.core.text import quoted
 from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.model.ros_names import namespace
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.ros.setup.discovery import RANGES
 
 if TYPE_CHECKING:
     from automax_ros.rackfile.model.config import RackConfig
-
-
-_RANGES = ("localhost", "subnet", "off")
 
 
 def add_ros_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--range``, and make the subcommand accept ``--ros-args`` as ``ros``."""
     parser.add_argument(
         "--range",
-        choices=_RANGES,
+        choices=RANGES,
         dest="discovery",
         help="which hosts this program communicates with in its ROS domain (default: what "
         "ROS_AUTOMATIC_DISCOVERY_RANGE says, else this host)",

@@ -129,8 +129,9 @@ def _writing(path: Path) -> Iterator[Path]:
     try:
         with atomic_write(path) as place:
             yield place
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
+    except (OSError, ValueError) as error:  # ValueError: the suffix is not that of a picture format
+        reason = getattr(error, "strerror", None) or error
+        raise UsageError(f"{path} cannot be written: {reason}") from error
 
 
 def image_of(figure: Any) -> bytes:

@@ -11,15 +11,14 @@ import csv
 import json
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from math import cos, pi, radians, sqrt
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from automax_ros.cli.options.values import number
 from automax_ros.cli.output.files import opened_for_writing
-from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.user_error import UsageError
 from automax_ros.drive.base.errors import LARGEST, DriveError, require
 from automax_ros.drive.base.motor import Motor, MotorData
@@ -37,10 +36,6 @@ COLUMNS = ("t_s", "armature_a", "armature_v", "speed_rad_s")
 ROW_NS = 1_000_000
 SHORT_MARGIN_US = 400.0
 """Margin below which the report warns: SCRs of these drives recover in 100 to 400 us."""
-
-
-class _Table(Protocol):
-    def writerow(self, row: Sequence[object], /) -> object: ...
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,19 +82,15 @@ def run(arguments: argparse.Namespace) -> int:
     )
     try:
         if arguments.motor_k is None:
-            _refuse_motor_options(arguments)
+            for name in ("inertia", "friction", "load", "duration", "csv"):
+                if getattr(arguments, name) is not None:
+                    raise UsageError(f"--{name} is for a motor's run", "give --motor-k as well")
             _steady(case, arguments)
         else:
             _run_motor(case, arguments)
     except DriveError as error:
         raise UsageError(str(error)) from error
     return 0
-
-
-def _refuse_motor_options(arguments: argparse.Namespace) -> None:
-    for name in ("inertia", "friction", "load", "duration", "csv"):
-        if getattr(arguments, name) is not None:
-            raise UsageError(f"--{name} is for a motor's run", "give --motor-k as well")
 
 
 def _steady(case: BridgeCase, arguments: argparse.Namespace) -> None:
@@ -157,10 +148,10 @@ def _run_motor(case: BridgeCase, arguments: argparse.Namespace) -> None:
     load = require("load torque in N m", arguments.load or 0.0, -LARGEST, LARGEST)
     circuit = Circuit(case.line(), Bridge(), Motor(data, load=load))
     if arguments.csv is None:
-        last = _simulate(case, circuit, duration_s, None)
+        last = _simulate(case, circuit, duration_s, lambda _: None)
     else:
         with opened_for_writing(arguments.csv) as file:
-            last = _simulate(case, circuit, duration_s, csv.writer(file, lineterminator="\n"))
+            last = _simulate(case, circuit, duration_s, csv.writer(file, lineterminator="\n").writerow)
     if arguments.json:
         print(json.dumps(last, indent=2))
     else:
@@ -174,21 +165,21 @@ def _run_motor(case: BridgeCase, arguments: argparse.Namespace) -> None:
         print(f"automax bridge: on the way: {', '.join(sorted(failures))}", file=sys.stderr)
 
 
-def _simulate(case: BridgeCase, circuit: Circuit, duration_s: float, table: _Table | None) -> dict[str, float]:
+def _simulate(
+    case: BridgeCase, circuit: Circuit, duration_s: float, write: Callable[[Sequence[object]], object]
+) -> dict[str, float]:
     """Run the motor and return its last row, with the greatest current of all rows."""
     motor = circuit.machine
     assert isinstance(motor, Motor)
     bridge = ConstantAlpha(circuit, radians(case.alpha_deg), bridge=2 if case.reverse else 1)
-    if table is not None:
-        table.writerow(COLUMNS)
+    write(COLUMNS)
     greatest = 0.0
     values = (0.0, 0.0, 0.0, 0.0)
     for row in range(int(duration_s * 1e9 + 0.5) // ROW_NS + 1):
         bridge.advance(row * ROW_NS)
         values = (row / 1000, circuit.current_a, circuit.armature_v, motor.speed_rad_s)
         greatest = max(greatest, abs(circuit.current_a))
-        if table is not None:
-            table.writerow([f"{values[0]:.3f}", *(f"{value:.6g}" for value in values[1:])])
+        write([f"{values[0]:.3f}", *(f"{value:.6g}" for value in values[1:])])
     return {**dict(zip(COLUMNS, values, strict=True)), "greatest_a": greatest}
 
 
@@ -201,7 +192,7 @@ def plot(case: BridgeCase, state: SteadyState, path: Path) -> None:
     Raises:
         UsageError: matplotlib is missing, or the file cannot be written.
     """
-    from automax_ros.cli.output.figure import new_figure
+    from automax_ros.cli.output.figure import new_figure, save
 
     figure = new_figure(10, 9, dpi=100, what="--plot")
     moments = list(waveforms(case, state))
@@ -220,12 +211,7 @@ def plot(case: BridgeCase, state: SteadyState, path: Path) -> None:
         f"load {case.resistance_ohm:g} Ω, {case.inductance_h * 1e3:g} mH, EMF {case.emf_v:g} V",
         fontsize=10,
     )
-    try:
-        with atomic_write(path) as place:
-            figure.savefig(place, dpi=150)
-    except (OSError, ValueError) as error:  # ValueError: the suffix is not that of a picture format
-        reason = getattr(error, "strerror", None) or error
-        raise UsageError(f"{path} cannot be written: {reason}") from error
+    save(figure, path, dpi=150)
 
 
 def _draw_voltages(axis: Any, time_ms: list[float], moments: list[Moment], case: BridgeCase) -> None:

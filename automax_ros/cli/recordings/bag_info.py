@@ -29,16 +29,22 @@ _MOST_CELL = 60
 
 def lines_of(content: Mapping[str, Any]) -> list[str]:
     """Return the lines that describe a recording."""
+    errors = [
+        [task["name"], f"line {item['line']}", item["code"], count_of(item["count"], "time")]
+        for task in content["tasks"]
+        for item in task["errors_by_line"]
+    ]
+    stored = [[item["name"], _size(item["size"]), f"sha256 {item['sha256']}"] for item in content["attachments"]]
     return [
         *_head(content),
         *_section("tasks", [_TASK_HEAD, *map(_task_row, content["tasks"])] if content["tasks"] else []),
-        *_section("errors logged", [row for task in content["tasks"] for row in _errors(task)]),
+        *_section("errors logged", errors),
         *_section("operations", [_operation_row(item) for item in content["operations"]]),
         *_section("variables", _variable_rows(content["variables"])),
         *_section("writers", _writers(content["writers"])),
         *_section("topics", [_TOPIC_HEAD, *map(_topic, content["topics"])] if content["topics"] else []),
         *_section("files", [_FILE_HEAD, *map(_file, content["files"])]),
-        *_section("stored inside", [_file_cells(item) for item in content["attachments"]]),
+        *_section("stored inside", stored),
         *_section("recorded with", [[key, value] for key, value in content["custom_data"].items()]),
         *_verdict(content),
     ]
@@ -81,13 +87,6 @@ def _task_row(task: Mapping[str, Any]) -> list[str]:
     return ["-" if cell is None else str(cell) for cell in cells]
 
 
-def _errors(task: Mapping[str, Any]) -> list[list[str]]:
-    return [
-        [task["name"], f"line {item['line']}", item["code"], count_of(item["count"], "time")]
-        for item in task["errors_by_line"]
-    ]
-
-
 def _operation_row(item: Mapping[str, Any]) -> list[str]:
     done = "" if item["ok"] else "refused"
     why = ": ".join(text for text in (done, item["reason"]) if text)
@@ -123,10 +122,6 @@ _FILE_HEAD = ["name", "size", "chunks", "stored", "unpacked"]
 def _file(file: Mapping[str, Any]) -> list[str]:
     sizes = [_size(file[key]) for key in ("stored_bytes", "unpacked_bytes")]
     return [file["name"], _size(file["size"]), str(file["chunks"]), *sizes]
-
-
-def _file_cells(item: Mapping[str, Any]) -> list[str]:
-    return [item["name"], _size(item["size"]), f"sha256 {item['sha256']}"]
 
 
 def _verdict(content: Mapping[str, Any]) -> list[str]:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from automax_ros.cli.options.values import add_window_arguments, option_number, whole_number, window_of
 from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, where_of
+from automax_ros.cli.output.difference_figure import can_be_drawn, draw, traces
 from automax_ros.cli.output.files import require_different_files, require_picture_file
 from automax_ros.cli.output.screen import print_diagnostics, print_warning_count, share_shown
 from automax_ros.cli.output.signals import ended_by_signals
@@ -23,7 +24,6 @@ from automax_ros.parallel.job import ClusterFault, Workers
 from automax_ros.rackfile.reading.files import FileFault, read_task_source
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
-from automax_ros.replay.picture import can_be_drawn, draw, traces
 from automax_ros.replay.scans.report import ReplayReport
 from automax_ros.replay.scans.stored_rack import SourceRefused
 from automax_ros.replay.side_by_side import replay_side_by_side
@@ -81,7 +81,9 @@ def run(arguments: argparse.Namespace) -> int:
         require_picture_file(arguments.plot)
     where = where_of(arguments)
     new = {name: _source(name, path) for name, path in files.items()}
-    _require_replayed(options, new)
+    for name in new:
+        if options.only is not None and name not in options.only:
+            raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
     try:
         report = _run_replay(Replay(arguments.bag, new, options), where, arguments)
     except SourceRefused as error:
@@ -166,13 +168,6 @@ def _source(name: str, path: Path) -> SourceText:
         return read_task_source(path)
     except FileFault as fault:
         raise UsageError(f"--task {name}: {path} {fault}") from fault
-
-
-def _require_replayed(options: ReplayOptions, new: dict[str, SourceText]) -> None:
-    """Refuse a new source for a task that --only excludes."""
-    for name in new:
-        if options.only is not None and name not in options.only:
-            raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
 
 
 def _with_repair(error: BagError, bag: Path) -> BagError:

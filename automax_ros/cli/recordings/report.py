@@ -160,7 +160,7 @@ def _drive(run: DriveRun, errors: int, picture: bytes | None) -> list[str]:
     else:
         parts.append('<p class="note">The recording holds no course of this drive.</p>')
     parts += ["<h3>Totals</h3>", *rows(("", ""), totals(run, errors), numbers=())]
-    parts += [*_faults(run), *sequence(run.events, run.omitted), *_notes(run), "</section>"]
+    parts += [*_faults(run), *sequence(run.happened.events, run.happened.omitted), *_notes(run), "</section>"]
     return parts
 
 

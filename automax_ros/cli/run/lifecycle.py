@@ -198,18 +198,15 @@ class LifecycleRunner:
 
     def _report_fault(self, fault: Exception) -> None:
         """Log why the rack cannot be configured; at an autostart the command prints it as it ends."""
+        findings = getattr(fault, "findings", ())
         if not self._is_starting:
-            _print_fault(fault)
-        found = [(item, where) for where, items in getattr(fault, "findings", ()) for item in items]
+            for source, diagnostics in findings:
+                print_diagnostics(diagnostics, source, sys.stderr)
+            if str(fault):
+                print(f"automax run: {fault}", file=sys.stderr, flush=True)
+        found = [(item, where) for where, items in findings for item in items]
         for item, where in found[:_MOST_SHOWN]:
             self._node.get_logger().error(render(item, where))
-
-
-def _print_fault(fault: Exception) -> None:
-    for source, diagnostics in getattr(fault, "findings", ()):
-        print_diagnostics(diagnostics, source, sys.stderr)
-    if str(fault):
-        print(f"automax run: {fault}", file=sys.stderr, flush=True)
 
 
 def _numbered_folder(folder: Path | None, number: int) -> Path | None:

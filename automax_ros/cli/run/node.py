@@ -102,7 +102,10 @@ def run(arguments: argparse.Namespace) -> int:
             return 1
         processes = processes_of(config)
         if arguments.module is None:
-            _print_processes(processes)
+            for process in processes:
+                print(f"{process.name:18}{' '.join(process.modules)}")
+                for reason in process.reasons:
+                    print(f"{'':18}{reason}")
             return 0
         return _run(arguments, config, processes, stop)
 
@@ -142,13 +145,6 @@ def _run(
     except RetentionFault as error:
         print(error, file=sys.stderr)
         return 2
-
-
-def _print_processes(processes: tuple[RackProcess, ...]) -> None:
-    for process in processes:
-        print(f"{process.name:18}{' '.join(process.modules)}")
-        for reason in process.reasons:
-            print(f"{'':18}{reason}")
 
 
 def _run_id(text: str) -> int:

@@ -231,8 +231,12 @@ def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
         return run_simulated(plan, stop)
     if arguments.distributed:
         from automax_ros.cli.run.distributed import run_distributed
+        from automax_ros.ros.base.node import follows_clock
 
-        _check_clock(plan)
+        if follows_clock(plan.ros, plan.config.namespace):
+            raise UsageError(
+                "use_sim_time: processes of a distributed rack agree by the wall clock", "run it without --distributed"
+            )
         return run_distributed(plan, arguments, stop)
     from automax_ros.cli.run.lifecycle import LifecycleRun, run_managed
 
@@ -290,16 +294,6 @@ def _check_time(arguments: argparse.Namespace) -> None:
         raise UsageError("--rate belongs to --simulated --ros", "without ROS time passes as fast as possible")
     if arguments.simulated and not arguments.with_ros and arguments.ros is not None and arguments.ros.given:
         raise UsageError("--ros-args: with --simulated nothing of ROS is started", "add --ros, or leave them out")
-
-
-def _check_clock(plan: RunPlan) -> None:
-    """Refuse ``use_sim_time`` for a distributed rack, before its processes are started."""
-    from automax_ros.ros.base.node import follows_clock
-
-    if follows_clock(plan.ros, plan.config.namespace):
-        raise UsageError(
-            "use_sim_time: processes of a distributed rack agree by the wall clock", "run it without --distributed"
-        )
 
 
 def _rate(text: str | None) -> float | None:

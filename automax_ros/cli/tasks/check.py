@@ -64,7 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Check all files, also those after one that cannot be read."""
     target = target_of(arguments)
-    _refuse_idle_options(arguments)
+    given = arguments.tick_ms is not None or arguments.target != Platform.AUTOMAX.value
+    if given and all(map(is_rack_file, arguments.files)):
+        raise UsageError("--target and --tick-ms are for tasks given by themselves", "a rack file has `tick_ms:`")
     findings: list[_Findings] = []
     unusable = 0
     for path in arguments.files:
@@ -85,13 +87,6 @@ def run(arguments: argparse.Namespace) -> int:
     if unusable or not all(one.usable for one in findings):
         return 2
     return 1 if has_errors(diagnostics) else 0
-
-
-def _refuse_idle_options(arguments: argparse.Namespace) -> None:
-    """Refuse ``--target`` and ``--tick-ms`` if all files are rack files, which define what runs their tasks."""
-    given = arguments.tick_ms is not None or arguments.target != Platform.AUTOMAX.value
-    if given and all(map(is_rack_file, arguments.files)):
-        raise UsageError("--target and --tick-ms are for tasks given by themselves", "a rack file has `tick_ms:`")
 
 
 def _task_file(path: Path, target: TaskTarget) -> list[_Findings]:

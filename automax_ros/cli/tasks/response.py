@@ -24,10 +24,9 @@ from automax_ros.cli.tasks.tune_info import checked_program, frequency_text
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.text import table
 from automax_ros.core.user_error import UsageError
-from automax_ros.language.program import Program
 from automax_ros.tuning.driven import STANDING
 from automax_ros.tuning.dynamic_calls import DynamicCall, require_running, tuning_of
-from automax_ros.tuning.frequency import MeasuredResponse, decibels
+from automax_ros.tuning.frequency import decibels
 from automax_ros.tuning.response import BlockResponse, FrequencyPoint, FrequencyRange, measured_response
 from automax_ros.tuning.step_response import MOST_SCANS, SETTLED, default_scans
 from automax_ros.tuning.transfer_text import fixed, number_text
@@ -79,7 +78,20 @@ def run(arguments: argparse.Namespace) -> int:
         from automax_ros.cli.output.figure import require_matplotlib
 
         require_matplotlib("--output")
-    response = _measure(arguments, program, call, tuning)
+    parameters, assumed = call.standing_inputs()
+    require_running(call)
+    response = measured_response(
+        path=arguments.file,
+        call=call,
+        tuning=tuning,
+        period_ns=program.period_ns,
+        parameters=parameters,
+        frequencies=_range(arguments, tuning),
+        amplitude=arguments.amplitude,
+        step=arguments.step,
+        scans=_scans(arguments, tuning),
+        assumed=assumed,
+    )
     if arguments.output is not None:
         from automax_ros.cli.tasks.response_plot import plot
 
@@ -92,30 +104,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _show(arguments: argparse.Namespace, response: BlockResponse) -> None:
-
     if arguments.json:
         print(json.dumps(record(response), indent=2, allow_nan=False))
     elif arguments.output is None and arguments.csv is None:
         sys.stdout.write(report(response))
     else:
         sys.stdout.write(notes(response))
-
-
-def _measure(arguments: argparse.Namespace, program: Program, call: DynamicCall, tuning: Tuning) -> BlockResponse:
-    parameters, assumed = call.standing_inputs()
-    require_running(call)
-    return measured_response(
-        path=arguments.file,
-        call=call,
-        tuning=tuning,
-        period_ns=program.period_ns,
-        parameters=parameters,
-        frequencies=_range(arguments, tuning),
-        amplitude=arguments.amplitude,
-        step=arguments.step,
-        scans=_scans(arguments, tuning),
-        assumed=assumed,
-    )
 
 
 def _require_known(call: DynamicCall, tuning: Tuning) -> None:
@@ -278,17 +272,13 @@ def _legend(response: BlockResponse) -> str:
         lines.append("~ few counts come out: rounding to whole counts leaves 0.5 dB or more uncertain")
     touched = sorted({what for item in found for what in item.touched})
     if touched:
-        advice = "; a smaller --amplitude may avoid it" if _may_be_smaller(found) else ""
+        smaller = any(item.amplitude > 1 and item.touched and STANDING not in item.touched for item in found)
+        advice = "; a smaller --amplitude may avoid it" if smaller else ""  # it cannot avoid a MAX_CHANGE of 0
         lines.append(f"~ limit: the block runs into {' and '.join(touched)}{advice}")
     missed = sum(point.measured is None for point in response.points)
     if missed:
         lines.append(f"- not measured ({missed}): so slow that it would take millions of scans")
     return "".join(f"{line}\n" for line in lines)
-
-
-def _may_be_smaller(found: Sequence[MeasuredResponse]) -> bool:
-    """Return whether a smaller sine could avoid the limits that were reached; it cannot avoid a MAX_CHANGE of 0."""
-    return any(item.amplitude > 1 and item.touched and STANDING not in item.touched for item in found)
 
 
 def _level(gain: complex) -> str:

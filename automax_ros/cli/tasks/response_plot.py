@@ -79,10 +79,12 @@ def _draw_bode(gain: Any, phase: Any, response: BlockResponse) -> None:
     grid = sorted({*logarithmic(low, high, _CURVE), *(rad_s for rad_s in near if low < rad_s < high)})
     for laplace, colour, label in ((True, _LAPLACE, "Laplace function"), (False, _DESIGN, "discrete, not rounded")):
         curve = followed(response.transfer, grid, laplace=laplace)
+        angles = [angle if abs(value) > 1e-9 else math.nan for value, angle in curve]  # NaN is not drawn: no signal
         gain.plot(grid, [_level(value) for value, _ in curve], color=colour, linewidth=1.2, label=label)
-        phase.plot(grid, [_angle(value, angle) for value, angle in curve], color=colour, linewidth=1.2)
+        phase.plot(grid, angles, color=colour, linewidth=1.2)
     for reliable, label in ((True, "measured"), (False, "measured, uncertain or at a limit")):
-        _draw_points(gain, phase, [p for p in response.points if _is(p, reliable)], label, reliable=reliable)
+        points = [p for p in response.points if p.measured is not None and p.measured.reliable is reliable]
+        _draw_points(gain, phase, points, label, reliable=reliable)
     _draw_marks(gain, phase, response)
     gain.set_ylabel("gain, dB")
     gain.set_title(_amplitudes(response), fontsize=9)
@@ -102,10 +104,6 @@ def _draw_bode(gain: Any, phase: Any, response: BlockResponse) -> None:
     bottom, top = gain.get_ylim()
     gain.set_ylim(max(bottom, _LOWEST_DB - 5.0), max(top, bottom + 6.0))
     gain.legend(fontsize=8, frameon=False)
-
-
-def _is(point: FrequencyPoint, reliable: bool) -> bool:
-    return point.measured is not None and point.measured.reliable is reliable
 
 
 def _draw_points(gain: Any, phase: Any, points: list[FrequencyPoint], label: str, *, reliable: bool) -> None:
@@ -165,11 +163,6 @@ def _amplitudes(response: BlockResponse) -> str:
 def _level(gain: complex) -> float:
     level = decibels(gain)
     return _LOWEST_DB if level is None or not math.isfinite(level) else max(level, _LOWEST_DB)
-
-
-def _angle(gain: complex, degrees: float) -> float:
-    """Return a phase, NaN (not drawn) where there is no signal."""
-    return degrees if abs(gain) > 1e-9 else math.nan
 
 
 def _hertz(rad_s: Any) -> Any:

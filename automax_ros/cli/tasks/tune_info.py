@@ -179,7 +179,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.ki is not None:
         _print_rate(arguments, program)
     elif program is not None:
-        _print_blocks(arguments, program)
+        found = [(call, tuning_of(call, program)) for call in chosen_calls(program, arguments)]
+        if arguments.json:
+            print(json.dumps(task_record(arguments.file, program, found), indent=2, allow_nan=False))
+        else:
+            sys.stdout.write(report(arguments.file, program, found))
     return 0
 
 
@@ -191,15 +195,6 @@ def checked_program(arguments: argparse.Namespace) -> Program | None:
         return None
     require_clock(arguments.file, result.program)
     return result.program
-
-
-def _print_blocks(arguments: argparse.Namespace, program: Program) -> None:
-
-    found = [(call, tuning_of(call, program)) for call in chosen_calls(program, arguments)]
-    if arguments.json:
-        print(json.dumps(task_record(arguments.file, program, found), indent=2, allow_nan=False))
-    else:
-        sys.stdout.write(report(arguments.file, program, found))
 
 
 def _print_rate(arguments: argparse.Namespace, program: Program | None) -> None:

@@ -208,16 +208,13 @@ class StatementLowering:
             flow.count()
             if self._jumps(statement):
                 self.emitter.mark_line(statement.number)
-                self._flow_one(flow, statement)
+                row = self._flowing.get(type(statement))
+                if row is None:
+                    self._lower_simple(statement)
+                else:
+                    row.carry_out(self, flow, statement)
             else:
                 self._lower_straight((statement,))
-
-    def _flow_one(self, flow: Flow, statement: Statement) -> None:
-        row = self._flowing.get(type(statement))
-        if row is None:
-            self._lower_simple(statement)
-        else:
-            row.carry_out(self, flow, statement)
 
     def _goto(self, flow: Flow, statement: Goto) -> None:
         self._charge(statement)

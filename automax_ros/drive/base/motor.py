@@ -226,11 +226,6 @@ class Motor(Machine):
         self._load_of: SpeedLoad | None = load if callable(load) else None
         self._steady_nm = 0.0 if callable(load) else load
 
-    @property
-    def kinetic_j(self) -> float:
-        """The kinetic energy, J; ``shaft_j`` is the sum of its increase, ``friction_j`` and ``load_j``."""
-        return 0.5 * self.inertia_kg_m2 * self.speed_rad_s**2
-
     def emf(self, duration_s: float) -> float:
         """Return the EMF (V) expected in the middle of the next ``duration_s``."""
         half = 0.5 * duration_s

@@ -18,16 +18,12 @@ REVERSED: Final = (6, 5, 4, 3, 2, 1)
 """The same on a line of the other rotation."""
 
 
-def _words(order: tuple[int, ...], add: int) -> tuple[int, ...]:
-    """Return the gate bits of each position: its SCR and the one fired before it."""
-    return tuple(gate_bits(order[place] + add, order[place - 1] + add) for place in range(6))
-
-
 _GATES: Final = {
-    (bridge, reverse): _words(REVERSED if reverse else STANDARD, 10 * (bridge - 1))
-    for bridge in (1, 2)
-    for reverse in (False, True)
+    (bridge, reverse): tuple(gate_bits(order[place] + add, order[place - 1] + add) for place in range(6))
+    for bridge, add in ((1, 0), (2, 10))
+    for reverse, order in ((False, STANDARD), (True, REVERSED))
 }
+"""The gate bits of each position: its SCR and the one fired before it."""
 _new = tuple.__new__
 
 

@@ -85,15 +85,13 @@ class Pll(Stateful):
         self.error_ns = -late
         if abs(late) > LOST_NS:
             return self._lose()
-        self._correct(-late, 1000 * measured.phase_step, 1000 * measured.period_step)
+        # Period and phase move towards the line, at most by the steps.
+        phase_ns, period_ns = 1000 * measured.phase_step, 1000 * measured.period_step
+        self._take_period(self.period_ns + max(-period_ns, min(period_ns, -late // 2)))
+        self.next_ns = self.period_ns // 6 + max(-phase_ns, min(phase_ns, -late))
         self._good = self._good + 1 if abs(late) <= LOCKED_NS else 0
         self.locked = self.locked or self._good >= LOCK_CYCLES
         return False
-
-    def _correct(self, error: int, phase_ns: int, period_ns: int) -> None:
-        """Move period and phase towards the line by an error, ns, at most by the steps."""
-        self._take_period(self.period_ns + max(-period_ns, min(period_ns, error // 2)))
-        self.next_ns = self.period_ns // 6 + max(-phase_ns, min(phase_ns, error))
 
     def _take_period(self, period_ns: int) -> None:
         self.period_ns = max(SHORTEST_NS, min(LONGEST_NS, period_ns))

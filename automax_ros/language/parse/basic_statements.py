@@ -19,11 +19,6 @@ from automax_ros.language.tree import tree
 
 _FORM = "AMX4110"
 ACCESSES = ("EXCLUSIVE", "NON_EXCLUSIVE")
-WAITING_KEYS = frozenset(
-    {"EVERY", "CHANNEL", "AS", "FILE", "TYPE", "DEPTH", "SETUP", "ACCESS", "EMPTY", "FULL", *ACCESSES, *tree.ITEM_TYPES}
-    | {unit.value for unit in tree.Unit}
-)
-"""Words inside these statements; none is reserved."""
 _OPEN_CHANNEL = "OPEN CHANNEL FOR INPUT AS FILE #1, TYPE = (I, R), DEPTH = 8"
 _OPEN_PORT = 'OPEN "PORTB" AS FILE #1, SETUP = 0D00H, 9600'
 

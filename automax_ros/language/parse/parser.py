@@ -43,7 +43,7 @@ class StatementReader:
             if token.text == "NEXT":
                 return self._next(cursor)
             if token.text == "ELSE":
-                return self._else(cursor)
+                return self._frames.begin_else(cursor, cursor.advance().span)
             if token.text == "END_IF":
                 cursor.advance()
                 return self._frames.end_if(cursor, token.span)
@@ -220,10 +220,6 @@ class StatementReader:
         cursor.expect_end()
         self._frames.next(cursor, control, start.span)
 
-    def _else(self, cursor: Cursor) -> None:
-        token = cursor.advance()
-        self._frames.begin_else(cursor, token.span)
-
 
 def _span(cursor: Cursor, start: int) -> Span:
     """Return the span from a token to the last read one on the same physical line."""
@@ -334,7 +330,8 @@ class _TaskParser:
             return
         try:
             if cursor.current.kind is TokenKind.REMARK:
-                self._frames.add(_remark(cursor.advance()))
+                token = cursor.advance()
+                self._frames.add(Remark(str(token.value), token.text == "!", span=token.span))
                 return
             self._statements.read(cursor)
             cursor.expect_end()
@@ -369,7 +366,3 @@ class _TaskParser:
             self._reporter.statement = None
             fault = SourceFault("AMX0003", "lower case is read as upper case", "the real compiler wants upper case")
             self._reporter.report(fault, span)
-
-
-def _remark(token: Token) -> Statement:
-    return Remark(str(token.value), token.text == "!", span=token.span)

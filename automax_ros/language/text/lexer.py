@@ -155,7 +155,8 @@ class LineLexer:
         strange = _STRANGE.match(text, position)
         if strange is not None:
             here = Span(here.line, position + 1, strange.end() + 1)
-        return _unknown_character(char, here)
+        shown = f"`{char}`" if char.isprintable() else f"with the code {ord(char):02X} hex"
+        return _error(char, here, "AMX0004", f"character {shown} has no meaning here", _CHARACTER_HINTS.get(char))
 
     def _saw_lower(self, text: str, span: Span) -> None:
         if self.lower_case is None:
@@ -206,11 +207,6 @@ def _open_string(text: str, here: Span) -> Token:
     span = Span(here.line, here.column, len(text) + 1)
     hint = f"end it with {quote} on the same line; a remark begins with `!`"
     return _error(BROKEN_END if continues else quote, span, "AMX0020", "the string is not closed", hint)
-
-
-def _unknown_character(char: str, span: Span) -> Token:
-    shown = f"`{char}`" if char.isprintable() else f"with the code {ord(char):02X} hex"
-    return _error(char, span, "AMX0004", f"character {shown} has no meaning here", _CHARACTER_HINTS.get(char))
 
 
 _CHARACTER_HINTS = {

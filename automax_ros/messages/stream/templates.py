@@ -74,18 +74,15 @@ class _Builder:
             if field.array:
                 self._add("I", (len(value),))
             for text in value if field.array else (value,):
-                self._add_text(text)
+                data = text.encode() + b"\0"
+                self._add("I", (len(data),))
+                self._add("s", (data,))
         elif field.array:
             self._add("I", (len(value),))
             for item in value:
                 self.add_message(field.kind, item, prefix)
         else:
             self.add_message(field.kind, value, prefix)
-
-    def _add_text(self, text: str) -> None:
-        data = text.encode() + b"\0"
-        self._add("I", (len(data),))
-        self._add("s", (data,))
 
     def _add(self, code: str, values: Sequence[Any], group: int = -1) -> None:
         """Add values of one code with the padding before them; of a group that varies only their number counts."""

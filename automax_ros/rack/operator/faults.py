@@ -20,7 +20,6 @@ from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.modules.processor import ProcessorConfig
 from automax_ros.runtime.memory.views import WriteGroup
-from automax_ros.runtime.scan.error_log import ErrorLog
 from automax_ros.runtime.tasks.cml_task import CmlTask
 from automax_ros.runtime.tasks.task import ScanRecord, Task
 
@@ -77,7 +76,7 @@ def _codes(rack: Rack, tasks: list[str]) -> Iterator[str]:
     if cause is not None and cause.code and _concerns(rack, cause.task, tasks):
         yield cause.code
     for name in tasks:
-        yield from _logged_codes(rack.task(name).errors)
+        yield from (entry.hardware for entry in reversed(rack.task(name).errors.entries) if entry.hardware)
 
 
 def _concerns(rack: Rack, task: str, tasks: list[str]) -> bool:
@@ -90,11 +89,6 @@ def _concerns(rack: Rack, task: str, tasks: list[str]) -> bool:
 def _is_on_processor(rack: Rack, task: str) -> bool:
     placed = rack.config.placed_tasks
     return any(item.name == task and isinstance(module, ProcessorConfig) for module, item in placed)
-
-
-def _logged_codes(log: ErrorLog) -> Iterator[str]:
-    """Yield the codes in a log, the newest first."""
-    return (entry.hardware for entry in reversed(log.entries) if entry.hardware)
 
 
 class DriveTrips:

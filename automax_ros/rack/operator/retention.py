@@ -178,7 +178,11 @@ class Retention:
         own = (item for item in rack.forces() if rack.part.holds_common_memory or "." in item.name)
         document |= {"forced": {item.name: item.value for item in own}, "tasks": tasks}
         if rack.config.auto_run:
-            document["status"] = self._statuses()
+            # While the power is off those that ran before count as running.
+            ran = frozenset() if rack.operations.powered else rack.operations.ran_at_power_off
+            document["status"] = {
+                task.name: (Status.RUNNING if task.name in ran else task.status).name for task in rack.tasks
+            }
         return document
 
     def save(self, document: Document | None = None) -> bool:
@@ -211,12 +215,6 @@ class Retention:
             if variable.presets:
                 document["commons"][variable.name]["values"] = list(variable.presets)
         return document
-
-    def _statuses(self) -> dict[str, str]:
-        """Return the tasks' status; while the power is off those that ran before count as running."""
-        rack = self._rack
-        ran = frozenset() if rack.operations.powered else rack.operations.ran_at_power_off
-        return {task.name: (Status.RUNNING if task.name in ran else task.status).name for task in rack.tasks}
 
     def _restore(self, document: Document) -> Restored:
         if document["format"] != FORMAT:

@@ -134,7 +134,7 @@ class NetworkKind(ModuleKind):
     def read(self, found: ModuleSection) -> NetworkConfig | None:
         """Read network, drop and depth."""
         section = found.section
-        if not section.require(("network", "drop"), found.where, found.span, found.findings):
+        if not section.require(("network", "drop"), found.where, found.span):
             return None
         network, drop = section.read(_NETWORK), section.read(_DROP)
         place, node = section.get("drop"), section.get("depth")

@@ -27,7 +27,7 @@ from automax_ros.language.tree.walk import arguments_of, expressions_of, parts, 
 from automax_ros.rackfile.model.module import Interrupt, ModuleConfig, Registers
 from automax_ros.rackfile.model.plants import PlantConfig, plant_name
 from automax_ros.rackfile.modules.kind import ModuleKind, ModuleSection, RackLayout
-from automax_ros.rackfile.reading.values import Key, ProblemList, Section, choice_key, entries_of
+from automax_ros.rackfile.reading.values import Key, ProblemList, Section, choice_key
 from automax_ros.rackfile.sections.tasks import TaskPlace, TaskPlaces, tasks_schema
 
 COUNT = 2048
@@ -180,7 +180,9 @@ UDC = UdcKind()
 
 def _plants(found: ModuleSection) -> Mapping[str, PlantConfig]:
     node, what = found.section.get("plants"), f"plants of {found.where}"
-    section = Section(entries_of(node, what, found.findings) or () if node else (), what, DRIVES, found.findings)
+    if node is None:
+        return {}
+    section = Section(node, what, DRIVES, found.findings)
     named = ((drive, section.get(drive)) for drive in DRIVES)
     claimed = ((drive, found.plants.claim(node, f"drive {drive} of {found.where}")) for drive, node in named if node)
     return {drive: plant for drive, plant in claimed if plant is not None}

@@ -63,15 +63,14 @@ def scale_of(
 ) -> Scale | None:
     """Read the scale of a variable, ``{counts: [a, b], value: [x, y]}``; None if a problem was reported."""
     what = f"scale of {name}"
-    entries = entries_of(node, what, findings)
-    if entries is None:
+    if entries_of(node, what, findings) is None:
         return None
     if is_array or not kind.is_integer:
         message = f"{name} cannot have a scale: it is {'an array' if is_array else kind.word}"
         findings.add(_CODE, message, span, "only a simple INTEGER or DOUBLE INTEGER has counts")
         return None
-    section = Section(entries, what, _KEYS, findings)
-    if not section.require(_KEYS, what, span, findings):
+    section = Section(node, what, _KEYS, findings)
+    if not section.require(_KEYS, what, span):
         return None
     low, high = (int(limit) for limit in kind.range)
     counts = _pair(section, "counts", partial(integer_value, low=low, high=high, code=_CODE))

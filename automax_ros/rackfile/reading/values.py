@@ -250,26 +250,28 @@ class Section:
     """A mapping whose keys have fixed names.
 
     Reports AMX6006 for a repeated key and AMX6007 for an unknown key. ``owner`` names the section in messages about its
-    values, ``findings`` is the list of problems.
+    values, ``findings`` is the list of problems, ``well_formed`` tells whether the node has keys and values.
     """
 
     def __init__(
         self,
-        entries: Iterable[Entry],
+        node: Node,
         what: str,
         known: Collection[str],
         findings: ProblemList,
         hints: Mapping[str, str] | None = None,
         owner: str | None = None,
     ) -> None:
-        """Sort the entries; ``what`` names the section in messages, ``known`` are its keys.
+        """Sort the entries of a node; ``what`` names the section in messages, ``known`` are its keys.
 
         ``hints`` have, for unknown keys that users may try, the right ones. ``owner`` is ``what`` if not given, "" if
         messages about values name the key alone.
         """
         self.owner, self.findings = what if owner is None else owner, findings
         self._values: dict[str, Entry] = {}
-        for key, value in entries:
+        entries = entries_of(node, what, findings)
+        self.well_formed = entries is not None
+        for key, value in entries or ():
             if key.text not in known:
                 hint = (hints or {}).get(key.text) or did_you_mean(key.text, known)
                 hint = hint or f"{what} has the keys {', '.join(known)}"
@@ -302,13 +304,13 @@ class Section:
         """Return the place of a key that the section has."""
         return self._values[key][0].span
 
-    def require(self, keys: Iterable[str], what: str, span: Span, findings: ProblemList) -> bool:
-        """Report AMX6009 if keys are missing; return whether all are there."""
+    def require(self, keys: Iterable[str], what: str, span: Span) -> bool:
+        """Report AMX6009 if keys are missing from what is well formed; return whether all are there."""
         missing = [key for key in keys if key not in self._values]
-        if missing:
+        if missing and self.well_formed:
             word = "key" if len(missing) == 1 else "keys"
             names = ", ".join(quoted(key) for key in missing)
-            findings.add("AMX6009", f"{what} lacks the {word} {names}", span)
+            self.findings.add("AMX6009", f"{what} lacks the {word} {names}", span)
         return not missing
 
 

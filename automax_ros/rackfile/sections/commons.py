@@ -160,11 +160,11 @@ class CommonReader:
 
     def _variable(self, key: Scalar, node: Node) -> CommonVariable | None:
         declared = self._name(key)
-        options = entries_of(node, f"options of {quoted(key.text)}", self._findings)
-        if declared is None or options is None:
+        has_options = entries_of(node, f"options of {quoted(key.text)}", self._findings) is not None
+        if declared is None or not has_options:
             return None
         name = declared.name
-        section = Section(options, f"common variable {name}", OPTIONS, self._findings, owner=name)
+        section = Section(node, f"common variable {name}", OPTIONS, self._findings, owner=name)
         self._check_predefined(key, declared, section)
         variable = CommonVariable(name, declared.type, declared.dimensions, declared.length, line=key.span.line)
         direction = self._direction(section, variable, key)

@@ -11,7 +11,7 @@ from automax_ros.core.yaml_text import Node
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.coupling import LEAST_RATIO, MOST_RATIO, CouplingData
 from automax_ros.rackfile.model.plants import CoupleConfig, PlantConfig, build_plants, couple_plants, plant_name
-from automax_ros.rackfile.reading.values import ProblemList, Section, entries_of, number_key, schemas, text_key
+from automax_ros.rackfile.reading.values import ProblemList, Section, number_key, schemas, text_key
 
 CODE = "AMX6478"
 _TO = text_key("to", plant_name("The other plant."))
@@ -29,11 +29,8 @@ SCHEMA: Schema = section("What couples the shaft to that of another plant.", KEY
 def read_couple(node: Node, what: str, findings: ProblemList) -> CoupleConfig | None:
     """Return the coupling of a plant, None if a problem was reported."""
     where = f"couple of {what}"
-    entries = entries_of(node, where, findings)
-    if entries is None:
-        return None
-    section = Section(entries, where, KEYS, findings)
-    if not section.require(("to",), where, node.span, findings):
+    section = Section(node, where, KEYS, findings)
+    if not section.require(("to",), where, node.span):
         return None
     named, text, numbers = section.get("to"), section.read(_TO), section.read_all(NUMBERS)
     if text is None or named is None:

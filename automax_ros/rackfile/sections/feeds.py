@@ -77,11 +77,10 @@ class _FeedReader:
     def read(self, plant: str, key: Scalar, node: Node) -> FeedConfig | None:
         findings = self._findings
         where = f"feed {printable(key.text)} of plant {plant}"
-        entries = entries_of(node, where, findings)
-        if entries is None:
+        section = Section(node, where, KEYS, findings)
+        if not section.well_formed:
             return None
-        section = Section(entries, where, KEYS, findings)
-        section.require(("signal",), where, key.span, findings)
+        section.require(("signal",), where, key.span)
         signal = section.read(_SIGNAL)
         every_ms = section.read(EVERY_MS) if EVERY_MS.name in section else _USUAL_MS
         target = self._target(key, where)

@@ -23,7 +23,7 @@ from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.rackfile.model.plants import JointCommand
 from automax_ros.rackfile.reading.scale import SCHEMA as SCALE
 from automax_ros.rackfile.reading.scale import Scale, scale_of
-from automax_ros.rackfile.reading.values import Key, ProblemList, Section, entries_of, schemas, text_key, text_value
+from automax_ros.rackfile.reading.values import Key, ProblemList, Section, schemas, text_key, text_value
 
 CODE = "AMX6310"
 _ABSENT = "the rack has no common variable"
@@ -74,7 +74,7 @@ class GivenJoint:
 def read_joint(node: Node, plant: str, findings: ProblemList) -> GivenJoint:
     """Return the joint of a plant, by default with the plant's name; report errors in the findings."""
     where = f"joint of plant {plant}"
-    section = Section(entries_of(node, where, findings) or (), where, _KEYS, findings, owner=f"the {where}")
+    section = Section(node, where, _KEYS, findings, owner=f"the {where}")
     name = section.read(_NAME) or plant
     commands = ((interface, section.get(interface)) for interface in INTERFACES)
     return GivenJoint(plant, name, tuple((interface, node) for interface, node in commands if node is not None))
@@ -109,11 +109,8 @@ class _CommandReader:
     def read(self, joint: GivenJoint, interface: str, node: Node) -> JointCommand | None:
         findings = self._findings
         where = f"{interface} of the joint of plant {joint.plant}"
-        entries = entries_of(node, where, findings)
-        if entries is None:
-            return None
-        section = Section(entries, where, _COMMAND_KEYS, findings)
-        if not section.require(("common",), where, node.span, findings):
+        section = Section(node, where, _COMMAND_KEYS, findings)
+        if not section.require(("common",), where, node.span):
             return None
         named = section.get("common")
         assert named is not None

@@ -11,7 +11,6 @@ from automax_ros.rackfile.reading.values import (
     ProblemList,
     Section,
     choice_key,
-    entries_of,
     number_key,
     schemas,
     wrong_kind,
@@ -100,14 +99,14 @@ LOAD_SCHEMA: Schema = may_be_empty(section("What the motor turns.", _LOAD_KEYS))
 def read_supply(node: Node, what: str, findings: ProblemList) -> SupplyConfig:
     """Return a plant's AC line; report errors in the findings."""
     where = f"line of {what}"
-    section = Section(entries_of(node, where, findings) or (), where, _SUPPLY_KEYS, findings)
+    section = Section(node, where, _SUPPLY_KEYS, findings)
     return SupplyConfig(**section.read_all(SUPPLY), standard=section.read(_ROTATION) is not False)
 
 
 def read_load(node: Node, what: str, findings: ProblemList) -> LoadConfig:
     """Return a plant's load; report errors in the findings. A held shaft has no others, which would have no effect."""
     where = f"load of {what}"
-    section = Section(entries_of(node, where, findings) or (), where, _LOAD_KEYS, findings, LOAD_HINTS)
+    section = Section(node, where, _LOAD_KEYS, findings, LOAD_HINTS)
     others = [key for key in ("torque_nm", "torque_per_rpm", "friction_nm", "ros") if key in section]
     if _SPEED.name in section and others:
         message = f"{where} holds the shaft at a speed: {others[0]} has no effect"

@@ -158,7 +158,7 @@ def read_plants(node: Node | None, findings: ProblemList) -> Plants:
 def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
     findings = plants.findings
     what = f"plant {name}"
-    section = Section(entries_of(node, what, findings) or (), what, KEYS, findings, LOAD_HINTS)
+    section = Section(node, what, KEYS, findings, LOAD_HINTS)
     motor = section.get("motor")
     line, load, couple, feeds, joint = (section.get(key) for key in ("line", "load", "couple", "feeds", "joint"))
     needless = next((option for option in _SIMULATED if option in section), "")
@@ -202,8 +202,8 @@ def _motor(node: Node, what: str, findings: ProblemList) -> str | NamePlate | No
 
 
 def _plate(node: YamlMapping, what: str, findings: ProblemList) -> NamePlate | None:
-    section = Section(node.entries, what, schemas(*_PLATE), findings)
-    if not section.require(_PLATE_REQUIRED, what, node.span, findings):
+    section = Section(node, what, schemas(*_PLATE), findings)
+    if not section.require(_PLATE_REQUIRED, what, node.span):
         return None
     numbers: dict[str, Any] = dict(section.read_all(_PLATE))
     return NamePlate(**numbers) if all(key.name in numbers or key.name not in section for key in _PLATE) else None

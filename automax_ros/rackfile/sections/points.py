@@ -45,7 +45,7 @@ class PointReader:
             return None
         what = f"I/O point {declared.name}"
         wanted = ("slot", "register", "bit") if declared.type is DataType.BOOLEAN else ("slot", "register")
-        if not section.require(wanted, what, span, self._findings) or not self._is_possible(section, declared):
+        if not section.require(wanted, what, span) or not self._is_possible(section, declared):
             return None
         slot = section.read(_SLOT, what)
         module = self._module(slot, section, what) if slot is not None else None

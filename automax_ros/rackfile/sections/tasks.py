@@ -106,11 +106,10 @@ class TaskReader:
             hint = f"write {quoted(key.text, marks='')}: {{file: {node.text}, {place_key.name}: {places.sample}}}"
             self.findings.add("AMX6008", f"{what} must be keys and values, not a file's name", node.span, hint)
             return None
-        entries = entries_of(node, what, self.findings)
-        if entries is None:
+        section = Section(node, what, schemas(_FILE, place_key, _CRITICAL), self.findings)
+        if not section.well_formed:
             return None
-        section = Section(entries, what, schemas(_FILE, place_key, _CRITICAL), self.findings)
-        section.require((place_key.name,), what, key.span, self.findings)
+        section.require((place_key.name,), what, key.span)
         place = section.read(place_key)
         file = self._file(section, key, name)
         is_critical = bool(section.read(_CRITICAL))

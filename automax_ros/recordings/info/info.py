@@ -213,7 +213,9 @@ def _count(info: BagInfo, record: object) -> None:
         elif name == _OPERATION and len(info.operations) < MOST_KEPT:
             info.operations.append(_decode(info, _OPERATION, record))
         elif name == _TABLE and info.table is None:
-            _keep_table(info, record)
+            table = _decode(info, _TABLE, record)
+            variables_of(info.path, table)
+            info.table = table
         elif name == _STRING and record.channel.topic.endswith(_FILES_TOPIC) and not info.texts:
             _keep_sent_files(info, record)
     elif isinstance(record, Attachment):
@@ -235,12 +237,6 @@ def _count_scan(info: BagInfo, record: RawMessage) -> None:
         for logged in _decode(info, _SCAN, record).errors:
             if logged in task.errors or len(task.errors) < MOST_KEPT:
                 task.errors[logged] += 1
-
-
-def _keep_table(info: BagInfo, record: RawMessage) -> None:
-    table = _decode(info, _TABLE, record)
-    variables_of(info.path, table)
-    info.table = table
 
 
 def _keep_sent_files(info: BagInfo, record: RawMessage) -> None:

@@ -165,7 +165,8 @@ class CommonLog:
         if missing < 0:
             return None
         if missing:
-            self._note_gap(missing, message)
+            if len(self.missing_writes) < MOST_GAPS:
+                self.missing_writes.append(_missing_text(missing, message))
             if not image:
                 self._bridge(missing, message)
         log.sequence = message.sequence
@@ -218,10 +219,6 @@ class CommonLog:
     def _bridge(self, missing: int, message: CommonImage | CommonWrite) -> None:
         text = _missing_text(missing, message)
         raise BagError("AMX6823", self._bag, text, "the recorder lost messages; `automax run --record` loses none")
-
-    def _note_gap(self, missing: int, message: CommonImage | CommonWrite) -> None:
-        if len(self.missing_writes) < MOST_GAPS:
-            self.missing_writes.append(_missing_text(missing, message))
 
     def _goes_backwards(self, write: CommonImage | CommonWrite) -> BagError:
         place, before = seconds_text(max(0, write.stamp)), self._last_write

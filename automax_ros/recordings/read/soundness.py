@@ -40,7 +40,7 @@ def verdict_of(reader: BagReader) -> Soundness:
         for entry in reader.messages(types=frozenset(message_types())):
             message = entry.message
             if isinstance(message, (CommonImage, CommonWrite, VariableTable)):
-                log = log or _log_of(reader)
+                log = log or (_StrictLog if reader.is_ours else CommonLog)(reader.path, run_facts(reader))
                 if isinstance(message, VariableTable):
                     log.check_table(message)
                 else:
@@ -63,10 +63,6 @@ class _StrictLog(CommonLog):
 
     def _odd(self, name: str, value: float) -> Value:
         raise ValueError(f"{name} cannot be {value!r}")
-
-
-def _log_of(reader: BagReader) -> CommonLog:
-    return (_StrictLog if reader.is_ours else CommonLog)(reader.path, run_facts(reader))
 
 
 class _Scans:

@@ -127,7 +127,9 @@ class ChunkThread:
             Exception: that of a previous job; this one is not carried out.
         """
         if self._worker is None:
-            self._begin()
+            arguments = self._calls, self._jobs, self._taken, self._done, self._failed
+            self._worker = threading.Thread(target=_work, args=arguments, name="recording", daemon=True)
+            self._worker.start()
         self.settle()
         self._taken.acquire(blocking=False)
         self._jobs.append(job)
@@ -157,11 +159,6 @@ class ChunkThread:
             self._calls.put(False)
             self._worker.join()
             self._worker = None
-
-    def _begin(self) -> None:
-        arguments = self._calls, self._jobs, self._taken, self._done, self._failed
-        self._worker = threading.Thread(target=_work, args=arguments, name="recording", daemon=True)
-        self._worker.start()
 
 
 def _work(

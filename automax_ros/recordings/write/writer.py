@@ -168,7 +168,10 @@ class BagWriter:
             log_time = stamp
         chunk = self._chunk
         if len(payload) + chunk.size > LONGEST_CHUNK_BYTES:
-            chunk = self._relieved_chunk(channel, stamp, payload)
+            if len(payload) > MAX_PAYLOAD_BYTES:
+                raise self._bad_message(channel, stamp, payload)
+            self.flush()
+            chunk = self._chunk
         channel.message_count = count = channel.message_count + 1
         chunk.add_message(channel.number, count & 0xFFFFFFFF, log_time, stamp, payload)
         self._last_time = log_time
@@ -317,13 +320,6 @@ class BagWriter:
             period = self._options.chunk_ns
             self._chunk_end = (time // period + 1) * period
         self._stamp = stamp
-
-    def _relieved_chunk(self, channel: RecordedChannel, stamp: int, payload: bytes) -> ChunkBuilder:
-        """Return an empty chunk for a long message; refuse one that is too long."""
-        if len(payload) > MAX_PAYLOAD_BYTES:
-            raise self._bad_message(channel, stamp, payload)
-        self.flush()
-        return self._chunk
 
     def _flush(self, *, wait: bool) -> None:
         try:

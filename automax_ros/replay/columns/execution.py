@@ -61,7 +61,7 @@ class PythonColumns:
 
     def columns(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> Executed:
         """Execute scans; see ``ColumnForm``."""
-        before = _copy(state)
+        before = [value[:] if isinstance(value, list) else value for value in state]
         io = self._execute(state, latched, count, read)
         if io.done < count:
             # The scan that could not be executed has changed the state: execute the scans before it again.
@@ -218,7 +218,3 @@ def _convert(kind: DataType, value: float) -> Value:
     if kind is DataType.REAL:
         return float(value)
     return bool(value) if kind is DataType.BOOLEAN else int(value)
-
-
-def _copy(state: StateValues) -> StateValues:
-    return [value[:] if isinstance(value, list) else value for value in state]

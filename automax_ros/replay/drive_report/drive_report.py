@@ -103,7 +103,7 @@ class _Reader:
             if scan.errors and scan.task == run.drive.task:
                 marks.take(time_ns, scan)
                 for error in scan.errors:
-                    run.add_event(time_ns / NS_PER_S, "error", error_text(error.code, error.line))
+                    run.happened.add_event(time_ns / NS_PER_S, "error", error_text(error.code, error.line))
 
     def read_plants(self, progress: Progress | None) -> None:
         """Read the plants of all drives, and the operations on the rack."""
@@ -119,7 +119,7 @@ class _Reader:
             time_s = time_ns / NS_PER_S
             if isinstance(message, Operation):
                 for run, _ in self._found if (text := operation_text(message)) else ():
-                    run.add_event(time_s, "operation", text)
+                    run.happened.add_event(time_s, "operation", text)
             elif message.plant in runs:
                 runs[message.plant].take_plant(time_s, message)
                 self._start_s = time_s if self._start_s is None else min(self._start_s, time_s)

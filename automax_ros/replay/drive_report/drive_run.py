@@ -16,7 +16,7 @@ from automax_ros.recordings.read.common_log import Watched
 from automax_ros.recordings.tables.traces import Course, Line, TraceRole
 from automax_ros.replay.drive_report.drive_signals import SPEED_REF, RecordedSignal, ReportDrive
 from automax_ros.replay.drive_report.drive_totals import CountTotals, PlantTotals, rpm_of
-from automax_ros.replay.drive_report.happenings import MOST_EVENTS, DriveEvent, Happenings
+from automax_ros.replay.drive_report.happenings import MOST_EVENTS, Happenings
 
 FAULTS = tuple(kind.output.upper() for kind in KINDS)
 """The fault outputs of DC_DRIVE_CML (52.2.2)."""
@@ -124,14 +124,16 @@ class DriveRun:
         if keyword in FAULTS:
             self._note_fault(time_s, signal, on=on)
         elif keyword == SUSPECT and value != before and on:
-            self.add_event(time_s, "fault", f"suspected shorted SCR: {_suspects(int(value))} ({signal.variable})")
+            number = int(value)
+            suspects = f"{number} or {PARTNER[number]}" if number in FORWARD else f"{number}"
+            self.happened.add_event(time_s, "fault", f"suspected shorted SCR: {suspects} ({signal.variable})")
             return
         if before is None or (before != 0.0) == on:
             return
         if keyword in STATES:
             text = STATES[keyword][0 if on else 1]
             if text:
-                self.add_event(time_s, "state", f"{text} ({signal.variable})")
+                self.happened.add_event(time_s, "state", f"{text} ({signal.variable})")
         if keyword == "DC_CML_STATE":
             self.starts += on
         elif keyword == "BRIDGE_POL":
@@ -143,12 +145,12 @@ class DriveRun:
         if on and keyword not in self._begun:
             self._begun[keyword] = time_s
             self.fault_count += 1
-            self.add_event(time_s, "fault", f"fault: {what} ({keyword} {signal.variable})")
+            self.happened.add_event(time_s, "fault", f"fault: {what} ({keyword} {signal.variable})")
         elif not on and keyword in self._begun:
             span = FaultSpan(keyword, signal.variable, what, self._begun.pop(keyword), time_s)
             if len(self.faults) < MOST_EVENTS:
                 self.faults.append(span)
-            self.add_event(time_s, "fault", f"no fault any more: {what} ({keyword} {signal.variable})")
+            self.happened.add_event(time_s, "fault", f"no fault any more: {what} ({keyword} {signal.variable})")
 
     def _draw(self, time_s: float, signal: RecordedSignal) -> None:
         keyword = signal.keyword
@@ -214,30 +216,18 @@ class DriveRun:
 
     def _note_plant(self, time_s: float, message: PlantState) -> None:
         if self._contactor is not None and message.contactor != self._contactor:
-            self.add_event(time_s, "plant", "the contactor is closed" if message.contactor else "the contactor is open")
+            self.happened.add_event(
+                time_s, "plant", "the contactor is closed" if message.contactor else "the contactor is open"
+            )
         self._contactor = message.contactor
         broken = tuple(message.faults[:MOST_BROKEN])
         for name in broken:
             if name not in self._broken:
-                self.add_event(time_s, "plant", f"the plant has {name}")
+                self.happened.add_event(time_s, "plant", f"the plant has {name}")
         for name in self._broken:
             if name not in broken:
-                self.add_event(time_s, "plant", f"the plant has {name} no longer")
+                self.happened.add_event(time_s, "plant", f"the plant has {name} no longer")
         self._broken = broken
-
-    @property
-    def events(self) -> list[DriveEvent]:
-        """The events, in the order of time after ``finish``."""
-        return self.happened.events
-
-    @property
-    def omitted(self) -> int:
-        """Number of events that are not kept."""
-        return self.happened.omitted
-
-    def add_event(self, time_s: float, kind: str, text: str) -> None:
-        """Add an event."""
-        self.happened.add_event(time_s, kind, text)
 
     def finish(self, end_s: float) -> None:
         """End the run: the last values hold to the end."""
@@ -261,10 +251,6 @@ class DriveRun:
             for number, key in enumerate(keys)
             for label, unit, kind, role in [key]
         ]
-
-
-def _suspects(number: int) -> str:
-    return f"{number} or {PARTNER[number]}" if number in FORWARD else f"{number}"
 
 
 def _cause_first(item: tuple[str, float]) -> int:

@@ -150,7 +150,8 @@ class Player:
         self.position = self._survey.begin
         for record in self._survey.latched.values():
             self._send(record)
-        self._set_time(time.monotonic_ns() + LEAD_NS)
+        self._zero_ns = self._next_clock = self._paused_since = time.monotonic_ns() + LEAD_NS
+        self._next_chore = 0
         for record in self._survey.messages():
             while (now := time.monotonic_ns()) < (due := self._due(record.log_time)) or self.paused:
                 if not self._wait(now, due, stopping, on_idle):
@@ -204,10 +205,6 @@ class Player:
 
     def _due(self, log_time: int) -> int:
         return self._zero_ns + round((log_time - self._survey.begin) / self._rate)
-
-    def _set_time(self, zero_ns: int) -> None:
-        self._zero_ns = self._next_clock = self._paused_since = zero_ns
-        self._next_chore = 0
 
     def _wait(self, now: int, due: int, stopping: Callable[[], bool], on_idle: Callable[[], None]) -> bool:
         """Serve ROS until the next deadline or clock tick, or for a moment; return False if asked to stop."""

@@ -45,7 +45,9 @@ class Reloading:
         """Answer a request: at once if it is refused, else when its source is compiled."""
         with self._rack_context.between_scans():
             try:
-                self._refuse_second(request.task)
+                if self._reloading:
+                    reason = f"the new source of {self._reloading} is still being compiled: ask again when that is done"
+                    self._reloads.refuse(request.task, reason)
                 name, source = self._reloads.admit(request.task, request.source)
             except Exception as error:
                 return self._conclude(request, response, error)
@@ -76,11 +78,6 @@ class Reloading:
     def close(self) -> None:
         """End; a source that is being compiled is not installed."""
         self._work.close()
-
-    def _refuse_second(self, task: str) -> None:
-        if self._reloading:
-            reason = f"the new source of {self._reloading} is still being compiled: ask again when that is done"
-            self._reloads.refuse(task, reason)
 
 
 MOST_SHOWN = 300

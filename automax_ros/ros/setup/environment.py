@@ -64,13 +64,20 @@ def prepare(*, may_restart: bool = True, discovery: str | None = None) -> None:
     if wheels_installed():
         changes = _needed_changes()
         if changes and may_restart and not restarted:
-            _restart(changes)
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os.execve(sys.executable, sys.orig_argv, {**os.environ, **changes, _RESTARTED: "1"})
         if changes:
             raise RosUnavailable(
                 f"{' and '.join(changes)} of this shell lead to another ROS 2 installation: "
                 f"start from a shell that has none sourced (unset {' '.join(changes)})"
             )
-        _check_middleware()
+        # The wheels bring Fast DDS only, but the shell may be prepared for another middleware.
+        name = os.environ.get("RMW_IMPLEMENTATION")
+        if name and not (Path(sys.prefix) / "lib" / f"lib{name}.so").exists():
+            raise RosUnavailable(
+                f"RMW_IMPLEMENTATION={name} is not installed in {sys.prefix}: unset RMW_IMPLEMENTATION"
+            )
     _check_imports()
 
 
@@ -112,19 +119,6 @@ def _own_library_folders() -> list[str]:
 
 def _entries(variable: str) -> list[str]:
     return [entry for entry in os.environ.get(variable, "").split(os.pathsep) if entry]
-
-
-def _restart(changes: dict[str, str]) -> None:
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os.execve(sys.executable, sys.orig_argv, {**os.environ, **changes, _RESTARTED: "1"})
-
-
-def _check_middleware() -> None:
-    """Check the middleware: the wheels bring Fast DDS only, but the shell may be prepared for another one."""
-    name = os.environ.get("RMW_IMPLEMENTATION")
-    if name and not (Path(sys.prefix) / "lib" / f"lib{name}.so").exists():
-        raise RosUnavailable(f"RMW_IMPLEMENTATION={name} is not installed in {sys.prefix}: unset RMW_IMPLEMENTATION")
 
 
 def _check_imports() -> None:

@@ -46,20 +46,13 @@ def joined_context(arguments: RosArguments = NO_ARGUMENTS) -> Context:
     try:
         context.init(args=arguments.words)
         if os.environ.get(_SECURITY, "").lower() == "true":
-            _try_security(context)
+            # A node makes DDS read the keys, which fails if it was built without security.
+            node = Node("security_check", context=context, enable_rosout=False, start_parameter_services=False)
+            node.destroy_node()
     except RuntimeError as error:
         context.try_shutdown()
         raise RosUnavailable(f"ROS 2 does not start: {str(error).strip()[:_MOST_SHOWN]}") from error
     return context
-
-
-def _try_security(context: Context) -> None:
-    """Create a node, so that DDS reads the keys, which fails if it was built without security.
-
-    Raises:
-        RuntimeError: it fails.
-    """
-    Node("security_check", context=context, enable_rosout=False, start_parameter_services=False).destroy_node()
 
 
 def make_executor(context: Context) -> Any:
@@ -164,7 +157,10 @@ class RosProcess:
         finally:
             staying = set(self.executor.get_nodes())
             if before - staying:
-                self._renew_executor(staying)
+                self.executor.shutdown()
+                self.executor = type(self.executor)(context=self.context)
+                for node in staying:
+                    self.executor.add_node(node)
             if spun and self._guard is not None:
                 self.spin(self._guard)
 
@@ -173,12 +169,6 @@ class RosProcess:
         self._rest()
         self.executor.shutdown()
         self.context.try_shutdown()
-
-    def _renew_executor(self, nodes: Iterable[Node]) -> None:
-        self.executor.shutdown()
-        self.executor = type(self.executor)(context=self.context)
-        for node in nodes:
-            self.executor.add_node(node)
 
     def _rest(self) -> None:
         self._rests = True

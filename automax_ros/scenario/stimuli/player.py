@@ -82,7 +82,8 @@ class WavePlayer:
         self._sample(signal, wave.value(0, start))
         if wave.for_ns == 0:
             return
-        key = self._key()
+        self._count += 1  # waves that started earlier come first
+        key = EventKey(EventClass.OUTSIDE, _BEGUN, f"{self._count:09d}")
 
         def end(_: int) -> None:
             self.rest(signal)
@@ -109,11 +110,6 @@ class WavePlayer:
                 signal.write(value)
             finally:
                 self.is_sampling = False
-
-    def _key(self) -> EventKey:
-        """Return the place of a wave's samples: waves that started earlier come first."""
-        self._count += 1
-        return EventKey(EventClass.OUTSIDE, _BEGUN, f"{self._count:09d}")
 
 
 _BEGUN = 0

@@ -97,8 +97,8 @@ def _join_values(verb: PlantVerb, node: YamlMapping, what: str, findings: Proble
 
     A value that is left out before another is the usual one.
     """
-    section = Section(node.entries, what, verb.keys, findings)
-    if not section.require(verb.keys[: verb.needed], what, node.span, findings):
+    section = Section(node, what, verb.keys, findings)
+    if not section.require(verb.keys[: verb.needed], what, node.span):
         return ""
     given = [section.get(key) for key in verb.keys]
     last = max(place for place, value in enumerate(given) if value is not None)
@@ -373,8 +373,8 @@ class _Sources:
     def _file_and_state(self, node: Node, what: str, key: Scalar, findings: ProblemList) -> tuple[Scalar | None, bool]:
         if not isinstance(node, YamlMapping):
             return _file(node, what, findings), False
-        section = Section(node.entries, what, ("file", "keep_state"), findings)
-        section.require(("file",), what, key.span, findings)
+        section = Section(node, what, ("file", "keep_state"), findings)
+        section.require(("file",), what, key.span)
         file, keep = section.get("file"), section.get("keep_state")
         keeps = boolean_value(keep, f"keep_state of {what}", findings) if keep is not None else False
         return _file(file, f"file of {what}", findings) if file is not None else None, bool(keeps)
@@ -408,11 +408,8 @@ def _file(node: Node, what: str, findings: ProblemList) -> Scalar | None:
 
 
 def _power(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
-    entries = entries_of(node, what, findings)
-    if entries is None:
-        return []
-    section = Section(entries, what, ("off_for", "battery"), findings)
-    section.require(("off_for",), what, node.span, findings)
+    section = Section(node, what, ("off_for", "battery"), findings)
+    section.require(("off_for",), what, node.span)
     off_for, battery = section.get("off_for"), section.get("battery")
     off_ns = time_of(off_for, f"off_for of {what}", findings) if off_for is not None else None
     good = boolean_value(battery, f"battery of {what}", findings) if battery is not None else True

@@ -203,7 +203,7 @@ class _Shape:
     findings: ProblemList
 
     def requires(self, *keys: str) -> bool:
-        return self.section.require(keys, self.what, self.span, self.findings)
+        return self.section.require(keys, self.what, self.span)
 
     def time(self, key: str) -> int | None:
         node = self.section.get(key)
@@ -239,10 +239,10 @@ def _wave_reader(
 def _shapes(node: Node, what: str, signals: Signals, keys: tuple[str, ...], findings: ProblemList) -> Iterator[_Shape]:
     for key, item in named(node, what, findings):
         signal = signal_of(key, signals, findings)
-        entries = entries_of(item, f"{quoted(key.text)} of {what}", findings)
-        if signal is not None and entries is not None:
+        is_shape = entries_of(item, f"{quoted(key.text)} of {what}", findings) is not None
+        if signal is not None and is_shape:
             name = f"{what} of {signal.label}"
-            yield _Shape(signal, Section(entries, name, keys, findings), name, key.span, findings)
+            yield _Shape(signal, Section(item, name, keys, findings), name, key.span, findings)
 
 
 def _is_number(shape: _Shape) -> bool:

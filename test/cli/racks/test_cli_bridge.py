@@ -103,7 +103,9 @@ def test_plot_is_a_picture(automax):
     wrong = automax("bridge", *CASE, "--alpha", "60", "--plot", "none/bridge.png")
     assert (wrong.code, wrong.out) == (2, "")
     assert "cannot be written" in wrong.err
-    assert automax("bridge", *CASE, "--alpha", "60", "--plot", "bridge.nothing").code == 2
+    for name in ("bridge.nothing", "bridge"):
+        assert automax("bridge", *CASE, "--alpha", "60", "--plot", name).code == 2
+        assert not (automax.folder / name).exists()
 
 
 def test_matplotlib_is_imported_only_to_plot():

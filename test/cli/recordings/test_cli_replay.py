@@ -98,9 +98,9 @@ def test_picture(automax, bag):
 
 def test_picture_of_several_lanes_shows_what_was_compared(source, tmp_path):
     """Both traces, the boolean among them, around the first difference."""
+    from automax_ros.cli.output.difference_figure import draw, traces
     from automax_ros.core.diagnostics import SourceText
     from automax_ros.replay.engine import Replay, ReplayOptions
-    from automax_ros.replay.picture import draw, traces
 
     pytest.importorskip("matplotlib")
     changed = edited(WORK, ("TOTAL > 2.0", "TOTAL > 1.0"), ("COUNT! + 1", "COUNT! + 2"), ("LEFT$(NOTE$, 4)", "NOTE$"))

@@ -145,7 +145,7 @@ def test_the_suspected_scrs_are_named_by_the_pair(automax, bag):
     with bag(rack=rack_file(more="  SCR%: {}\n"), task=task, names=names) as recording:
         recording.write(1.0, TACH_B=1, SCR_I=3)
     ((run, _),) = drive_report(automax.folder / "bag").drives
-    assert [event.text for event in run.events] == [
+    assert [event.text for event in run.happened.events] == [
         "fault: shorted SCR (BAD_SCR_OUT TACH@)", "suspected shorted SCR: 3 or 16 (SCR%)"
     ]  # fmt: skip
 
@@ -205,7 +205,7 @@ def test_a_window_holds_what_was_before_it(automax, bag):
     assert (report.start_s, report.end_s) == (2.0, 3.0)
     assert run.counts.rms == pytest.approx(2048 / 4095 * 150)
     assert run.counts.run_s == pytest.approx(1.0)
-    assert run.events == []
+    assert run.happened.events == []
 
 
 def test_lines_of_a_lane_that_agree_are_all_seen(automax, bag):
@@ -262,7 +262,7 @@ def test_an_inverted_input_is_turned_round(automax, bag):
         recording.write(1.0, RUN_B=1)
         recording.write(2.0, RUN_B=0)
     ((run, _),) = drive_report(automax.folder / "bag").drives
-    assert [(event.time_s, event.text) for event in run.events] == [
+    assert [(event.time_s, event.text) for event in run.happened.events] == [
         (1.0, "stop is requested (RUN@)"), (2.0, "start is requested (RUN@)")
     ]  # fmt: skip
 
@@ -328,7 +328,7 @@ def test_messages_with_impossible_numbers_are_passed_over(automax, bag, name, va
         recording.operation(4.0, "x" * 5000, "")
     ((run, _),) = drive_report(automax.folder / "bag").drives
     assert run.plant.rms_a == (0.0 if name == "speed_rpm" else 10.0)
-    assert max(len(event.text) for event in run.events) == 300
+    assert max(len(event.text) for event in run.happened.events) == 300
 
 
 def test_a_long_recording_keeps_its_peaks_and_the_page_its_size(automax, bag):
@@ -362,8 +362,8 @@ def test_what_comes_later_is_not_lost_to_what_comes_often(automax, bag):
             recording.write(step * 0.01, IOC_B=step % 2, RUN_B=step % 2)
         recording.operation(60.0, "stop_all", "")
     ((run, _),) = drive_report(automax.folder / "bag").drives
-    assert run.events[-1].text == "stop_all"
-    assert (run.fault_count, len(run.faults), run.omitted) == (2500, 2000, 6000)
+    assert run.happened.events[-1].text == "stop_all"
+    assert (run.fault_count, len(run.faults), run.happened.omitted) == (2500, 2000, 6000)
 
 
 def two_drives(bag):
@@ -549,7 +549,7 @@ def test_a_run_of_a_simulated_rack(automax):
     result = automax("run", ".", "--simulated", "--duration", "2.5", "--stimuli", "s.yaml", "--record", "bag")
     assert result.code == 0, result
     ((run, _),) = drive_report(automax.folder / "bag").drives
-    assert [event.text for event in run.events[:4]] == [
+    assert [event.text for event in run.happened.events[:4]] == [
         "set PERM@ = TRUE", "set REF% = 1500", "set RUN@ = TRUE", "start is requested (RUN@)"
     ]  # fmt: skip
     assert run.starts == 1

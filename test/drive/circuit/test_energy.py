@@ -51,11 +51,15 @@ class Regulated:
         self.firing.use_bridge(bridge)
 
 
+def kinetic_j(motor):
+    return 0.5 * motor.inertia_kg_m2 * motor.speed_rad_s**2
+
+
 def assert_balanced(drive):
     energy, motor = drive.circuit.energy, drive.motor
     moved = abs(energy.source_j) + abs(motor.shaft_j)
     assert energy.source_j == pytest.approx(energy.loss_j + energy.stored_j + motor.shaft_j, abs=0.0005 * moved)
-    assert motor.shaft_j == pytest.approx(motor.kinetic_j + motor.friction_j + motor.load_j, abs=1e-9 * moved)
+    assert motor.shaft_j == pytest.approx(kinetic_j(motor) + motor.friction_j + motor.load_j, abs=1e-9 * moved)
 
 
 def test_start_reversal_and_load_step_balance():
@@ -77,9 +81,8 @@ def test_start_reversal_and_load_step_balance():
     assert before > 100
     assert drive.motor.speed_rad_s < -50
     assert min(sample.mean_current_a for sample in samples) < -0.8 * amps
-    assert (
-        drive.circuit.energy.source_j
-        < started + drive.circuit.energy.loss_j + abs(drive.motor.load_j) + drive.motor.kinetic_j
+    assert drive.circuit.energy.source_j < started + drive.circuit.energy.loss_j + abs(drive.motor.load_j) + kinetic_j(
+        drive.motor
     )
     assert EventKind.COMMUTATION_FAILURE not in {event.kind for event in drive.circuit.take_events()}
 

@@ -65,7 +65,8 @@ def test_metering_changes_nothing_and_its_energies_balance():
     energies = signals_of(seen).energies
     parts = energies.loss_j + energies.stored_j + energies.shaft_j
     assert energies.line_j == pytest.approx(parts, rel=1e-3)
-    assert energies.shaft_j == pytest.approx(seen.motor.kinetic_j + seen.motor.friction_j, rel=1e-6)
+    kinetic_j = 0.5 * seen.motor.inertia_kg_m2 * seen.motor.speed_rad_s**2
+    assert energies.shaft_j == pytest.approx(kinetic_j + seen.motor.friction_j, rel=1e-6)
     assert energies.shaft_j > 1000.0
     assert signals_of(unseen).energies is None
 

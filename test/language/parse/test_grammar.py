@@ -11,7 +11,7 @@ from soaking import in_soak
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import PROBLEMS, Severity
-from automax_ros.language.parse.basic_statements import WAITING_KEYS, WAITING_STATEMENTS
+from automax_ros.language.parse.basic_statements import ACCESSES, WAITING_STATEMENTS
 from automax_ros.language.parse.declarations import EVENT_KEYS, TUNING_KEYS
 from automax_ros.language.parse.expressions import LEVELS
 from automax_ros.language.parse.parser import parse
@@ -20,6 +20,7 @@ from automax_ros.language.parse.unknown import FOREIGN_WORDS
 from automax_ros.language.text.lexer import LineLexer
 from automax_ros.language.text.tokens import BOOLEAN_WORDS, OPERATOR_WORDS, RESERVED_WORDS, STATEMENT_WORDS
 from automax_ros.language.tree.functions import FUNCTIONS
+from automax_ros.language.tree.tree import ITEM_TYPES, Unit
 from language.grammar import (
     OTHER_ANSWERS,
     RULES,
@@ -34,6 +35,11 @@ from language.grammar import (
 
 WAITING = "task statement"
 STATEMENTS = ("simple statement", "one-line if")
+WAITING_KEYS = {
+    *("EVERY", "CHANNEL", "AS", "FILE", "TYPE", "DEPTH", "SETUP", "ACCESS", "EMPTY", "FULL"),
+    *(*ACCESSES, *ITEM_TYPES, *(unit.value for unit in Unit)),
+}
+"""Words inside the statements that wait; none is reserved."""
 
 
 def repeatable(examples: int) -> settings:
@@ -52,7 +58,17 @@ def is_word(text: str) -> bool:
 def test_every_word_of_the_parser_stands_in_the_grammar_and_no_other() -> None:
     reserved = STATEMENT_WORDS | OPERATOR_WORDS | BOOLEAN_WORDS.keys() | {"THEN", "TO", "STEP"}
     assert reserved == RESERVED_WORDS
-    keys = {*EVENT_KEYS, *TUNING_KEYS, "NAME", "SET", *WAITING_STATEMENTS, *WAITING_KEYS, "OUTPUT"}
+    keys = {
+        *EVENT_KEYS,
+        *TUNING_KEYS,
+        "NAME",
+        "SET",
+        *WAITING_STATEMENTS,
+        *WAITING_KEYS,
+        *ITEM_TYPES,
+        *(unit.value for unit in Unit),
+        "OUTPUT",
+    }
     assert {word for word in words() if is_word(word)} == reserved | FUNCTIONS.keys() | keys
     assert SIMPLE_STATEMENTS.keys() | WAITING_STATEMENTS.keys() <= words()
 

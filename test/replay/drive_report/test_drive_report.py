@@ -43,8 +43,8 @@ def test_a_bag_of_ros2_bag_record_tells_the_same_drive(tmp_path: Path) -> None:
         run_of(bag, Window(600_000_000, 2_400_000_000)) for bag in recorded_twice(rack, tmp_path, steps, 25, 2.5)
     )
     assert ours.starts == 1
-    assert [event for event in theirs.events if event.kind == "state"] == [
-        event for event in ours.events if event.kind == "state"
+    assert [event for event in theirs.happened.events if event.kind == "state"] == [
+        event for event in ours.happened.events if event.kind == "state"
     ]
     assert ours.counts.greatest > 40
     for name in ("time_s", "run_s", "greatest", "rms", "heat_j"):
@@ -61,13 +61,13 @@ def test_files_of_a_split_recording_add_up_to_the_whole(tmp_path: Path) -> None:
     assert main([*run, "--record", str(tmp_path / "whole")]) == 0
     assert main([*run, "--record", str(tmp_path / "split"), "--record-split-s", "1"]) == 0
     whole, split = (run_of(tmp_path / name, Window()) for name in ("whole", "split"))
-    assert split.events == whole.events
-    assert any("lose_phase" in event.text for event in whole.events)
+    assert split.happened.events == whole.happened.events
+    assert any("lose_phase" in event.text for event in whole.happened.events)
     assert split.counts == whole.counts
     assert split.plant == whole.plant
     files = sorted((tmp_path / "split").glob("*.mcap"))
     assert len(files) == 3
     parts = [run_of(file, Window()) for file in files]
     assert [part.starts for part in parts] == [1, 0, 0]
-    assert sum(len(part.events) for part in parts) == len(whole.events)
+    assert sum(len(part.happened.events) for part in parts) == len(whole.happened.events)
     assert sum(part.counts.heat_j for part in parts) == pytest.approx(whole.counts.heat_j, rel=0.01)

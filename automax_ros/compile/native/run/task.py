@@ -52,11 +52,12 @@ def kept_translation(compiled: CompiledTask, cache: NativeCache, *, builds: bool
     key = translation_key(compiled, form)
     content = cache.read(key)
     if content is not None:
-        return _unpack(content)
+        name, text, limits = json.loads(zlib.decompress(content))
+        return NativeSource(name, text, tuple((low, high) for low, high in limits))
     if not builds:
         raise NotNative(NOT_KEPT)
     source = translated(compiled, form)
-    cache.keep(key, _pack(source))
+    cache.keep(key, zlib.compress(json.dumps([source.name, source.text, source.limits]).encode(), 1))
     return source
 
 
@@ -84,15 +85,6 @@ def _describe(item: object) -> str:
         return repr((item.block.name, item.period_s, sorted(item.literals.items()), item.evaluated))
     name = getattr(item, "__qualname__", None)
     return repr(item) if name is None else f"{getattr(item, '__module__', '')}.{name}"
-
-
-def _pack(source: NativeSource) -> bytes:
-    return zlib.compress(json.dumps([source.name, source.text, source.limits]).encode(), 1)
-
-
-def _unpack(content: bytes) -> NativeSource:
-    name, text, limits = json.loads(zlib.decompress(content))
-    return NativeSource(name, text, tuple((low, high) for low, high in limits))
 
 
 class NativeTask:

@@ -68,7 +68,8 @@ def translated(compiled: CompiledTask, form: TaskFunction) -> NativeSource:
     with collections_paused():
         translation = _Translation(compiled, form)
         known = translation.settled()
-        limits = tuple(_limits_of(known[name]) for name in translation.names)
+        ranges = [known[name] for name in translation.names]
+        limits = tuple((0, 0) if item.kind is NumberKind.REAL else (int(item.low), int(item.high)) for item in ranges)
         return NativeSource(compiled.program.name, translation.text(), limits)
 
 
@@ -178,10 +179,6 @@ def _at_first(field: StateField) -> Range:
     if field.below:
         return Range(NumberKind.INT, 0, field.below - 1)
     return exactly(field.initial)
-
-
-def _limits_of(known: Range) -> tuple[int, int]:
-    return (0, 0) if known.kind is NumberKind.REAL else (int(known.low), int(known.high))
 
 
 @cache

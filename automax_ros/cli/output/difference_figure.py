@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from automax_ros.cli.output.figure import new_figure, plain, save
 from automax_ros.core.names import element
-from automax_ros.core.safe_file import atomic_write
-from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
+from automax_ros.core.user_error import UsageError
 from automax_ros.messages.types.messages import Scan
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.recordings.mcap.errors import BagError
@@ -87,14 +86,14 @@ def draw(found: Sequence[Trace], report: ReplayReport, path: Path) -> None:
         BagError: matplotlib is missing, or the file cannot be written.
     """
     try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise BagError(
-            "AMX6834", path, "a picture needs matplotlib", "pip install matplotlib, or `make setup`"
-        ) from error
-    figure = Figure(figsize=(10, 1.2 + 2.2 * len(found)), layout="constrained")
-    FigureCanvasAgg(figure)
+        figure = new_figure(10, 1.2 + 2.2 * len(found), dpi=100)
+        _draw_lanes(figure, found, report)
+        save(figure, path, dpi=150)
+    except UsageError as error:
+        raise BagError("AMX6834", path, error.message.removeprefix(f"{path} "), error.hint) from error
+
+
+def _draw_lanes(figure: Any, found: Sequence[Trace], report: ReplayReport) -> None:
     lanes: Any = figure.subplots(len(found), 1, sharex=True, squeeze=False)
     for (axis,), trace in zip(lanes, found, strict=True):
         _draw_lane(axis, trace)
@@ -102,23 +101,10 @@ def draw(found: Sequence[Trace], report: ReplayReport, path: Path) -> None:
     lanes[0][0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=2, frameon=False)
     first = found[0].difference
     figure.suptitle(
-        f"{_plain(Path(report.bag).name)}: first difference of {first.task}, scan {first.first.scan} "
+        f"{plain(Path(report.bag).name)}: first difference of {first.task}, scan {first.first.scan} "
         f"at {first.first.time_s:.6g} s (open loop)",
         fontsize=10,
     )
-    try:
-        with warnings.catch_warnings(), atomic_write(path) as place:
-            warnings.simplefilter("ignore")  # characters that the font lacks
-            figure.savefig(place, dpi=150)
-    except OSError as error:
-        raise BagError("AMX6834", path, f"cannot be written: {error.strerror or error}") from error
-    except ValueError as error:
-        raise BagError("AMX6834", path, "names no format of pictures", "end it with .png, .svg or .pdf") from error
-
-
-def _plain(text: str) -> str:
-    """Return a text that matplotlib draws literally: no formulas, nothing unprintable."""
-    return printable(text).replace("$", r"\$")
 
 
 def _drawable(report: ReplayReport) -> list[Difference]:
@@ -155,7 +141,7 @@ def _draw_lane(axis: Any, trace: Trace) -> None:
         numbers = [float(value) for value in values]
         axis.step(trace.time_s, numbers, color=colour, linewidth=width, label=label, where="post")
     axis.axvline(difference.first.time_s, color="grey", linewidth=0.8, linestyle="--")
-    unit = f", {_plain(variable.unit)}" if variable.unit else ""
+    unit = f", {plain(variable.unit)}" if variable.unit else ""
     axis.set_title(f"{difference.task}: {difference.name}, from scan {difference.first.scan}", fontsize=9, loc="left")
     if variable.type is DataType.BOOLEAN:
         axis.set_yticks((0, 1), ("FALSE", "TRUE"))
