@@ -18,7 +18,7 @@ def test_a_rack_is_halted_stepped_and_resumed(live, ask) -> None:
     paused = ask("pause")
     assert paused.success
     at_ns, scans = live.rack.now_ns, live.rack.statistics["LINE"].scans
-    assert paused.message == f"rack time stands still at {at_ns / 1e9:.9g} s"
+    assert paused.message == f"rack time is frozen at {at_ns / 1e9:.9g} s"
     status = ask("status", "ReadStatus")
     assert (status.ok, status.halted, status.time_s) == (True, True, at_ns / 1e9)
     stepped = ask("step", "Step", what="scan", task=" line ", count=3)
@@ -35,7 +35,7 @@ def test_a_rack_is_halted_stepped_and_resumed(live, ask) -> None:
     tick = ask("step", "Step", what="tick", count=0)
     assert (tick.ok, tick.time_s) == (True, pytest.approx(until_s + 0.0055))
     resumed = ask("resume")
-    assert resumed.message == f"rack time goes on at {tick.time_s:.9g} s"
+    assert resumed.message == f"rack time runs at {tick.time_s:.9g} s"
     assert not ask("resume").success
     assert live.health.counts["refused request"] == 5
 

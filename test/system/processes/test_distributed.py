@@ -199,5 +199,5 @@ def test_two_racks_of_one_name_are_told_to_both(ros_domain_id, tmp_path):
         Automax("run", TYPES, environment=environments[1]) as two,
     ):
         for process in (one, two):
-            process.wait_for_line("another rack is called TYPES: their messages cannot be distinguished")
+            process.wait_for_line("another rack is named TYPES: their messages cannot be distinguished")
         assert [process.end(signal.SIGTERM).code for process in (one, two)] == [0, 0]

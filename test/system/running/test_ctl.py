@@ -113,7 +113,7 @@ def test_a_rack_is_operated_from_another_process(tmp_path):
 
 @pytest.mark.usefixtures("rack", "one_client")
 def test_a_rack_is_halted_and_stepped_from_another_process():
-    assert ctl("pause").out.startswith("pause: done, rack time stands still at ")
+    assert ctl("pause").out.startswith("pause: done, rack time is frozen at ")
     (stepped,) = json.loads(ctl("step", "scan", "SPEED", "--count", "2", "--json").out)
     at_s = stepped["answer"]["time_s"]
     assert (stepped["answer"]["why"], at_s) == ("done", pytest.approx(round(at_s / 0.0055) * 0.0055))
