@@ -566,4 +566,4 @@ def test_pipes_take_the_page_and_the_picture(automax, bag):
     assert automax("report", "bag", "--output", "/dev/stdout").code == 0
     os.mkfifo(automax.folder / "F")
     result = automax("report", "bag", "--output", "F")
-    assert (result.code, "nobody reads it" in result.err) == (2, True)
+    assert (result.code, "it is a pipe without a reader" in result.err) == (2, True)
