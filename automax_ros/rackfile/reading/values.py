@@ -250,7 +250,7 @@ class Section:
     """A mapping whose keys have fixed names.
 
     Reports AMX6006 for a repeated key and AMX6007 for an unknown key. ``owner`` names the section in messages about its
-    values, ``findings`` is the list of problems, ``well_formed`` tells whether the node has keys and values.
+    values, ``findings`` is the list of problems, ``well_formed`` whether the node has keys and values.
     """
 
     def __init__(
