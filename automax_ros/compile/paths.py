@@ -11,34 +11,34 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Span:
+class Bounds:
     """The least and the most time, in ns."""
 
     least: int
     most: int
 
-    def plus(self, other: Span) -> Span:
+    def plus(self, other: Bounds) -> Bounds:
         """Return the times of both, one after the other."""
-        return Span(self.least + other.least, self.most + other.most)
+        return Bounds(self.least + other.least, self.most + other.most)
 
-    def joined(self, other: Span | None) -> Span:
+    def joined(self, other: Bounds | None) -> Bounds:
         """Return the bounds of both alternatives."""
-        return self if other is None else Span(min(self.least, other.least), max(self.most, other.most))
+        return self if other is None else Bounds(min(self.least, other.least), max(self.most, other.most))
 
 
-NOTHING = Span(0, 0)
-Edges = Sequence[Mapping[Hashable, Span]]
+NOTHING = Bounds(0, 0)
+Edges = Sequence[Mapping[Hashable, Bounds]]
 """The targets of each node, the number of a node or an exit, with the time to each."""
 
 
-def ways_out(edges: Edges, entry: int) -> dict[Hashable, Span]:
+def ways_out(edges: Edges, entry: int) -> dict[Hashable, Bounds]:
     """Return the least and most time from a node to each exit of the graph.
 
     On a longest path each node counts once: where edges lead in a circle, one turn counts, of all its nodes (decision).
     """
     least = _least(edges, entry)
     most = _most(edges, entry)
-    return {way: Span(least[way], most[way]) for way in most}
+    return {way: Bounds(least[way], most[way]) for way in most}
 
 
 def longest_turn(edges: Edges, entry: int) -> int:

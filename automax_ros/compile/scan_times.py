@@ -16,7 +16,7 @@ from automax_ros.compile.base.cost import CostModel, Model
 from automax_ros.compile.lowering.basic_statements import WaitingLowering
 from automax_ros.compile.lowering.flow import counts_alone
 from automax_ros.compile.lowering.statements import GOSUB_DEPTH
-from automax_ros.compile.paths import NOTHING, Span, longest_turn, ways_out
+from automax_ros.compile.paths import NOTHING, Bounds, longest_turn, ways_out
 from automax_ros.language.checks.rules.constant_values import constant_value
 from automax_ros.language.program import Program
 from automax_ros.language.tree.tree import (
@@ -54,7 +54,7 @@ class _Way(enum.Enum):
     STOP = "STOP"
 
 
-_Ways = dict[Hashable, Span]
+_Ways = dict[Hashable, Bounds]
 """The exits from some statements, lines as ``("line", number)``, each with its time."""
 
 
@@ -74,7 +74,7 @@ def scan_times(program: Program, model: CostModel) -> ScanTimes:
     first = _first_repeated(program)
     edges = suite.edges(program.scan)
     ways = _to_the_end(ways_out(edges, first))
-    times = ways.get(_Way.END) or ways.get(_Way.STOP) or Span(0, longest_turn(edges, first))
+    times = ways.get(_Way.END) or ways.get(_Way.STOP) or Bounds(0, longest_turn(edges, first))
     around = NOTHING if program.is_basic else _around(program, model, ended=_Way.END in ways)
     times = times.plus(around)
     estimated = is_estimated(program.scan[first:], model) or _loop_ns(program, model) > 0
@@ -103,10 +103,10 @@ def _first_repeated(program: Program) -> int:
     return next(places, -1) + 1 if program.is_basic else 0
 
 
-def _around(program: Program, model: CostModel, ended: bool) -> Span:
+def _around(program: Program, model: CostModel, ended: bool) -> Bounds:
     """Return the time of SCAN_LOOP, or of the block in its place, and of END if the scan reaches it."""
     time = model.scan_loop_ns(program) + _loop_ns(program, model) + (model.end_ns(program) if ended else 0)
-    return Span(time, time)
+    return Bounds(time, time)
 
 
 def _loop_ns(program: Program, model: CostModel) -> int:
@@ -120,8 +120,8 @@ def is_estimated(statements: tuple[Statement, ...], model: CostModel) -> bool:
     return model.model is not Model.NONE and not kinds.isdisjoint(WaitingLowering.estimates_us)
 
 
-def _either(ways: _Ways, *names: _Way) -> Span | None:
-    found: Span | None = None
+def _either(ways: _Ways, *names: _Way) -> Bounds | None:
+    found: Bounds | None = None
     for name in names:
         if name in ways:
             found = ways[name].joined(found)
@@ -184,14 +184,14 @@ class _Suite:
         own = WaitingLowering.statement_ns(self.model, statement)
         if isinstance(statement, Call):
             least, most = self.model.block_bounds_ns(self.program.calls[statement.span])
-            return {_Way.NEXT: Span(least, most)}
+            return {_Way.NEXT: Bounds(least, most)}
         if isinstance(statement, If):
             inner = _join(self._branch(statement), self.ways(statement.otherwise))
         elif isinstance(statement, For):
             inner = self._loop(statement)
         else:
             inner = self._jump(statement)
-        return {way: span.plus(Span(own, own)) for way, span in inner.items()}
+        return {way: span.plus(Bounds(own, own)) for way, span in inner.items()}
 
     def _branch(self, statement: If) -> _Ways:
         """Return the exits of THEN; a jump that is all of an IF is in the IF's time (decision)."""
@@ -227,15 +227,15 @@ class _Suite:
         body = self.ways(statement.body)
         turn = body.get(_Way.NEXT)
         if turn is not None:
-            turn = turn.plus(Span(self.model.turn_ns, self.model.turn_ns))
+            turn = turn.plus(Bounds(self.model.turn_ns, self.model.turn_ns))
         most_before = (turns - 1) * turn.most if turns and turn else 0
         left: _Ways = {
-            way: Span(span.least, most_before + span.most) for way, span in body.items() if way is not _Way.NEXT
+            way: Bounds(span.least, most_before + span.most) for way, span in body.items() if way is not _Way.NEXT
         }
         if turns is None:
-            left[_Way.NEXT] = NOTHING if turn is None else Span(0, turn.most)
+            left[_Way.NEXT] = NOTHING if turn is None else Bounds(0, turn.most)
         elif turn is not None:
-            left[_Way.NEXT] = Span(turns * turn.least, turns * turn.most)
+            left[_Way.NEXT] = Bounds(turns * turn.least, turns * turn.most)
         return left
 
     def _turns(self, statement: For) -> int | None:
