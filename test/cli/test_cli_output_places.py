@@ -127,5 +127,5 @@ def test_an_empty_name_of_the_state_is_an_error_of_usage(run):
 def test_stimuli_without_entries_are_told(automax, run, text):
     result = run("--stimuli", automax.write("none.yaml", text))
     assert result.code == 0
-    assert result.err.count("holds no entries") == 1
+    assert result.err.count("has no entries") == 1
     assert "AMX6744" in result.err

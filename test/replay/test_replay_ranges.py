@@ -223,7 +223,7 @@ def test_a_value_that_no_message_tells_is_an_error(bag, tmp_path):
     with pytest.raises(BagError) as error:
         replayed(blind, {"WORK": added})
     assert error.value.code == "AMX6833"
-    assert "does not tell SPARE% before 0 s; task WORK reads it (new/WORK.BLK:1)" in str(error.value)
+    assert "does not contain SPARE% before 0 s; task WORK reads it (new/WORK.BLK:1)" in str(error.value)
 
 
 def test_recording_that_begins_in_the_middle(bag, tmp_path):

@@ -116,7 +116,7 @@ def test_stimuli_and_settings(automax, step):
         ("sacn", "did you mean scan?"),
         ("until", "write until S"),
         ("go now", "is not a number"),
-        ("scan SPEED 0", "1 to 1000000, not 0"),
+        ("scan SPEED 0", "between 1 and 1000000, not 0"),
         ("break SPEED:12x", "a line must be a whole number"),
         ("break NOTHING%", "no common variable 'NOTHING%'"),
         ("clear SUM!", "there is no breakpoint 'SUM!'"),

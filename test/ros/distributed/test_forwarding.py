@@ -184,7 +184,7 @@ def test_a_stop_all_and_a_run_all_concern_every_process(ask, racks):
     wait_until(lambda: not any(rack.operations.stopped for rack in (home, one, two)))
     refused = ask("Trigger", "pause")
     assert not refused.success
-    assert "several processes" in refused.message
+    assert "a distributed rack" in refused.message
 
 
 def test_a_source_is_reloaded_where_its_task_runs(ask, racks):

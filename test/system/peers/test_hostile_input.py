@@ -86,7 +86,7 @@ def attack(kind):
     ("kind", "told", "most_mb"),
     [
         ("large", "a message of 10,000,0", 250),  # DDS keeps what it has taken in: 10 of each topic
-        ("fast", "messages come faster than they can be taken", 30),
+        ("fast", "messages arrive faster than they can be processed", 30),
         ("malformed", "write refused: /types/common/GRID/set", 30),
         ("requests", "is longer than a rack takes", 120),
     ],
