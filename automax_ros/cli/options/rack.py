@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from automax_ros.cli.options.values import naming
 from automax_ros.cli.output.screen import print_diagnostics, print_warning_count
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import count_of
@@ -189,10 +190,8 @@ def split_settings(config: RackConfig, texts: list[str]) -> tuple[list[tuple[str
     for text in texts:
         task, _, name = _name(text).partition(".")
         if task in programs and name:
-            try:
+            with naming("--set"):
                 tunings.append(tuning(programs, text))
-            except UserError as fault:
-                raise UsageError(f"--set: {fault.message}", fault.hint) from fault
         else:
             others.append(text)
     return settings_of(config, others), tunings
@@ -208,10 +207,8 @@ def begin_with(rack: Rack, tunings: Sequence[TunableSetting]) -> None:
         UsageError: a task refuses a value.
     """
     for item in tunings:
-        try:
+        with naming(f"--set {item.task}.{item.name}"):
             rack.tune(rack.task(item.task), item.name, item.value)
-        except ValueError as error:
-            raise UsageError(f"--set {item.task}.{item.name}: {error}") from error
 
 
 def _name(text: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from automax_ros.cli.options.values import option_number, seconds
+from automax_ros.cli.options.values import naming, option_number, seconds
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.user_error import UsageError
@@ -69,10 +69,9 @@ def storage_options(compression: str | None, split_mb: str | None, prefix: str) 
     if chosen not in COMPRESSIONS:
         hint = did_you_mean(chosen, COMPRESSIONS) or f"there are {', '.join(COMPRESSIONS)}"
         raise UsageError(f"{prefix}compression: no compression {quoted(chosen)}", hint)
-    try:
-        return StorageOptions(chosen, _split_bytes(split_mb, f"{prefix}split-mb"))
-    except ValueError as error:
-        raise UsageError(f"{prefix}split-mb: {error}") from error
+    size = _split_bytes(split_mb, f"{prefix}split-mb")
+    with naming(f"{prefix}split-mb"):
+        return StorageOptions(chosen, size)
 
 
 def split_seconds(text: str) -> int:

@@ -10,12 +10,13 @@ from pathlib import Path
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
+from automax_ros.cli.options.values import naming
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.names import setting
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
 from automax_ros.core.types import Value
-from automax_ros.core.user_error import UsageError, UserError
+from automax_ros.core.user_error import UsageError
 from automax_ros.core.values import value_text
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import Program
@@ -74,10 +75,8 @@ def tick_option(text: str) -> int:
     """
     if not _MILLISECONDS.fullmatch(text):
         raise UsageError(f"--tick-ms {quoted(text)} is not a number of milliseconds such as 5.5")
-    try:
+    with naming("--tick-ms"):
         return tick_ns(text)
-    except ValueError as error:
-        raise UsageError(f"--tick-ms: {error}") from error
 
 
 def is_rack_file(path: Path) -> bool:
@@ -197,10 +196,8 @@ def settings_of(program: Program, texts: Sequence[str]) -> dict[str, Value]:
 
 
 def _setting(program: Program, text: str) -> tuple[str, Value]:
-    try:
+    with naming("--set"):
         meant, value = setting(text, program.symbols, "the task has no variable")
-    except UserError as fault:
-        raise UsageError(f"--set: {fault.message}", fault.hint) from fault
     tuning = meant.variable.tuning
     if tuning is not None and not isinstance(value, str) and not isinstance(tuning.low, str):
         assert not isinstance(tuning.high, str)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from automax_ros.core import values
 from automax_ros.core.ticks import seconds_ns
-from automax_ros.core.user_error import UsageError
+from automax_ros.core.user_error import UsageError, UserError
 
 if TYPE_CHECKING:
     from automax_ros.recordings.tables.series import Window
@@ -47,11 +49,33 @@ def option_number(option: str, text: str, low: float, high: float, what: str = "
     return found
 
 
+@contextmanager
+def naming(option: str) -> Iterator[None]:
+    """Name the option in the error of a block that reads its value.
+
+    Raises:
+        UsageError: the block raised a UserError or a ValueError.
+    """
+    try:
+        yield
+    except UserError as error:
+        raise UsageError(f"{option}: {error.message}", error.hint) from error
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from error
+
+
 def _argument(read: Callable[[str], _T], text: str) -> _T:
     try:
         return read(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def add_output_argument(
+    parser: argparse.ArgumentParser, metavar: str, help_text: str, *, required: bool = False
+) -> None:
+    """Add ``--output``, for short ``-o``."""
+    parser.add_argument("--output", "-o", type=Path, required=required, metavar=metavar, help=help_text)
 
 
 def add_window_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,6 +12,7 @@ import re
 import sys
 from pathlib import Path
 
+from automax_ros.cli.options.values import add_output_argument
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.cli.racks.new import require_free, write_rack_file
 from automax_ros.core.diagnostics import SourceText, has_errors
@@ -31,9 +32,7 @@ _MODULE = re.compile(r"([0-9]{1,2})=(.{1,20})")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax import``."""
     parser.add_argument("file", type=Path, metavar="RACK.CNF", help="the configuration task")
-    parser.add_argument(
-        "--output", "-o", type=Path, metavar="RACK.yaml", help="where to write (default: the standard output)"
-    )
+    add_output_argument(parser, "RACK.yaml", "where to write (default: the standard output)")
     parser.add_argument(
         "--module",
         action="append",

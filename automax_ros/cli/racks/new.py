@@ -13,6 +13,7 @@ from pathlib import Path
 
 from automax_ros.cli.options.rack import DEFAULT_RACK_FILE
 from automax_ros.cli.options.task import is_rack_file, tick_option
+from automax_ros.cli.options.values import add_output_argument
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.safe_file import atomic_write
@@ -27,9 +28,7 @@ from automax_ros.rackfile.old_plants.draft import Draft, DraftFault, draft
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax new``."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the folder of the tasks")
-    parser.add_argument(
-        "--output", "-o", type=Path, metavar="RACK.yaml", help=f"where to write (default: FOLDER/{DEFAULT_RACK_FILE})"
-    )
+    add_output_argument(parser, "RACK.yaml", f"where to write (default: FOLDER/{DEFAULT_RACK_FILE})")
     parser.add_argument(
         "--processors",
         type=int,

@@ -18,7 +18,7 @@ from typing import TypeVar
 
 from automax_ros.cli.options.rack import add_outside_argument, config_of, print_refused
 from automax_ros.cli.options.stimuli import StimuliRefused, stimulation
-from automax_ros.cli.options.values import seconds_above_0, whole_number
+from automax_ros.cli.options.values import add_output_argument, seconds_above_0, whole_number
 from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, print_native, where_of
 from automax_ros.cli.output.screen import ProgressBar
 from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
@@ -101,13 +101,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--stimuli", type=Path, metavar="FILE", help="play this stimuli file in each run (docs/stimuli.md)"
     )
-    parser.add_argument(
-        "--output",
-        "-o",
-        type=Path,
-        metavar="FOLDER",
-        help="new folder for runs.csv, runs.npz, sweep.json, sweep.png",
-    )
+    add_output_argument(parser, "FOLDER", "new folder for runs.csv, runs.npz, sweep.json, sweep.png")
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run, of which there must be only one")
     add_where_arguments(parser, "do the runs")
     parser.add_argument("--json", action="store_true", help="print all runs for programs to read")

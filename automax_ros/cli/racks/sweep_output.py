@@ -16,12 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros import __version__
+from automax_ros.cli.options.values import naming
 from automax_ros.cli.output.figure import new_figure, plain, save
 from automax_ros.cli.output.files import require_folder, write_report, write_text
 from automax_ros.core.text import count_of, quoted, table
 from automax_ros.core.ticks import NS_PER_S, seconds_text
 from automax_ros.core.types import Value
-from automax_ros.core.user_error import UsageError, UserError
+from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.sweep.measures import Measure, read_measures
 from automax_ros.sweep.run import Plan, Row, best_rows
@@ -169,10 +170,8 @@ def best_of(
     if text is None:
         return measures[0], False
     way, _, named = text.strip().partition(" ")
-    try:
+    with naming("--best"):
         found = read_measures(named, config, duration_ns) if way in _WAYS else ()
-    except UserError as fault:
-        raise UsageError(f"--best: {fault.message}", fault.hint) from fault
     if len(found) != 1:
         raise UsageError(f"--best: {quoted(text)} is not min MEASURE or max MEASURE", "such as 'min rms(SPEED_ERR%)'")
     return found[0], _WAYS[way]

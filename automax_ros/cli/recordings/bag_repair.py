@@ -13,6 +13,7 @@ import json
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
+from automax_ros.cli.options.values import add_output_argument
 from automax_ros.cli.output.screen import ProgressBar
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
@@ -26,9 +27,7 @@ _EARLIEST_WALL_NS = 10**9 * NS_PER_S
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax bag repair``."""
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
-    parser.add_argument(
-        "--output", "-o", type=Path, metavar="NEW", help="folder of the repaired recording (default: BAG_repaired)"
-    )
+    add_output_argument(parser, "NEW", "folder of the repaired recording (default: BAG_repaired)")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON")
 
 

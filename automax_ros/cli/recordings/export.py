@@ -12,6 +12,7 @@ from pathlib import Path
 
 from automax_ros.cli.options.values import (
     add_grid_argument,
+    add_output_argument,
     add_watch_argument,
     add_window_arguments,
     watch_list,
@@ -30,14 +31,7 @@ from automax_ros.recordings.tables.series import Progress
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax export``."""
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
-    parser.add_argument(
-        "--output",
-        "-o",
-        type=Path,
-        required=True,
-        metavar="OUT",
-        help="the table to write: OUT.csv, or OUT.npz for NumPy",
-    )
+    add_output_argument(parser, "OUT", "the table to write: OUT.csv, or OUT.npz for NumPy", required=True)
     add_watch_argument(parser, "every simple common that is not a string")
     parser.add_argument("--scans", metavar="TASK", help="the scans of a task instead of common memory")
     add_window_arguments(parser)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from automax_ros.cli.options.values import add_window_arguments, watch_list, window_of
+from automax_ros.cli.options.values import add_output_argument, add_window_arguments, watch_list, window_of
 from automax_ros.cli.output.figure import FigureLayout, figure_of, save
 from automax_ros.cli.output.files import require_picture_file
 from automax_ros.cli.output.screen import share_shown
@@ -31,9 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="VAR",
         help="what to draw, such as REF%% RUN@ 'TABLE%%(3)'; commas may part them",
     )
-    parser.add_argument(
-        "--output", "-o", type=Path, required=True, metavar="FILE", help="the picture: FILE.png, .svg or .pdf"
-    )
+    add_output_argument(parser, "FILE", "the picture: FILE.png, .svg or .pdf", required=True)
     add_window_arguments(parser)
     parser.add_argument("--separate", action="store_true", help="a separate lane for each analog variable")
     parser.add_argument(

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from automax_ros.cli.options.recording import split_seconds, storage_options
 from automax_ros.cli.options.ros import add_ros_arguments, config_of, names_file, prepare_ros, ros_arguments, space_of
-from automax_ros.cli.options.values import seconds_above_0
+from automax_ros.cli.options.values import add_output_argument, seconds_above_0
 from automax_ros.cli.output.screen import StatusLine
 from automax_ros.cli.output.signals import StopRequest, stop_signals
 from automax_ros.cli.run.saving import DiskSync
@@ -49,9 +49,7 @@ _GAPS_SHOWN = 20
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax record``."""
     parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file or folder")
-    parser.add_argument(
-        "--output", "-o", type=Path, metavar="DIR", help="the new rosbag2 folder (default: rack and time)"
-    )
+    add_output_argument(parser, "DIR", "the new rosbag2 folder (default: rack and time)")
     parser.add_argument("--duration", type=seconds_above_0, metavar="S", help="seconds after which the recording ends")
     parser.add_argument("--tasks", metavar="A,B", help="record scans and states of these tasks only (default: all)")
     parser.add_argument(

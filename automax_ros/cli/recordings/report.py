@@ -16,7 +16,7 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
-from automax_ros.cli.options.values import add_window_arguments, window_of
+from automax_ros.cli.options.values import add_output_argument, add_window_arguments, window_of
 from automax_ros.cli.output.figure import FigureLayout, figure_of, image_of, save_picture
 from automax_ros.cli.output.files import require_different_files, require_writable, write_text
 from automax_ros.cli.output.screen import print_diagnostics, share_shown
@@ -256,7 +256,7 @@ _WIDTH_PX = 1400
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax report``."""
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
-    parser.add_argument("--output", "-o", type=Path, metavar="FILE.html", help="the page")
+    add_output_argument(parser, "FILE.html", "the page")
     parser.add_argument("--png", type=Path, metavar="FILE.png", help="the picture of all drives")
     parser.add_argument("--task", type=str.upper, metavar="NAME", help="the drive whose DC_DRIVE_CML is in this task")
     parser.add_argument(

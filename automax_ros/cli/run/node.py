@@ -12,16 +12,16 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from automax_ros.cli.options.rack import add_outside_argument, add_set_argument, config_of, print_refused, settings_of
-from automax_ros.cli.options.ros import add_ros_arguments, prepare_ros, ros_arguments
+from automax_ros.cli.options.rack import add_set_argument, config_of, print_refused, settings_of
+from automax_ros.cli.options.ros import prepare_ros, ros_arguments
 from automax_ros.cli.options.stimuli import StimuliRefused
-from automax_ros.cli.options.values import add_watch_argument, seconds_above_0
-from automax_ros.cli.options.work import add_native_arguments, native_forms
+from automax_ros.cli.options.values import seconds_above_0
+from automax_ros.cli.options.work import native_forms
 from automax_ros.cli.output.files import held_for_writing
 from automax_ros.cli.output.signals import StopRequest, stop_signals
 from automax_ros.cli.run.child_process import end_with_watcher
 from automax_ros.cli.run.plan import ProcessPlan, RunPlan
-from automax_ros.cli.run.run import check_files, folder, watched_commons
+from automax_ros.cli.run.run import add_shared_arguments, check_files, watched_commons
 from automax_ros.core.text import quoted
 from automax_ros.core.user_error import UsageError
 from automax_ros.rack.operator.retention import RetentionFault
@@ -65,23 +65,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="do not start before a recorder that was given the rack's file (`automax record CONFIG`) hears it",
     )
     add_set_argument(parser)
-    add_watch_argument(parser, "those of the rack file's `watch`")
-    parser.add_argument(
-        "--state",
-        type=folder,
-        metavar="DIR",
-        help="keep what outlives a power cycle in this folder (default: .automax/RACK/MODULE next to the rack file)",
+    add_shared_arguments(
+        parser,
+        "(default: .automax/RACK/MODULE next to the rack file)",
+        stimuli=": give it to every process of the rack",
+        report=" for this process",
     )
-    parser.add_argument(
-        "--stimuli",
-        type=Path,
-        metavar="FILE",
-        help="play this stimuli file, by rack time: give it to every process of the rack",
-    )
-    parser.add_argument("--report", type=Path, metavar="FILE.json", help="write how the run ended for this process")
-    add_native_arguments(parser)
-    add_outside_argument(parser)
-    add_ros_arguments(parser)
     # For `automax run --distributed`: prints the lines of cli/run/process_messages.py, ends when standard input does.
     parser.add_argument("--watched", action="store_true", help=argparse.SUPPRESS)
 

@@ -27,7 +27,7 @@ from automax_ros.cli.options.recording import add_record_arguments, recording_op
 from automax_ros.cli.options.ros import add_ros_arguments, prepare_ros, ros_arguments
 from automax_ros.cli.options.stimuli import StimuliRefused
 from automax_ros.cli.options.stimuli import stimulation as stimulation_of
-from automax_ros.cli.options.values import add_watch_argument, option_number, seconds_above_0, watch_list
+from automax_ros.cli.options.values import add_watch_argument, naming, option_number, seconds_above_0, watch_list
 from automax_ros.cli.options.work import add_native_arguments, native_forms
 from automax_ros.cli.output.files import held_for_writing, require_different_files, require_folder, require_writable
 from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
@@ -36,7 +36,7 @@ from automax_ros.cli.run.saving import RecordingMonitor, SavedState
 from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.types import bare_name
-from automax_ros.core.user_error import UsageError, UserError
+from automax_ros.core.user_error import UsageError
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.operator.retention import RetentionFault
 from automax_ros.rack.rack import Rack
@@ -155,30 +155,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
     add_set_argument(parser, tunables=True)
     add_record_arguments(parser)
+    add_shared_arguments(
+        parser,
+        "from run to run (default on the wall clock: .automax/RACK next to the rack file; simulated: nowhere)",
+        stimuli=" (docs/stimuli.md)",
+        report=": tasks, commons, forces, operations",
+    )
+
+
+def add_shared_arguments(parser: argparse.ArgumentParser, state: str, *, stimuli: str, report: str) -> None:
+    """Add the options that `automax run` and `automax node` share; the texts end the help of those they name."""
     add_watch_argument(parser, "those of the rack file's `watch`")
-    parser.add_argument(
-        "--state",
-        type=folder,
-        metavar="DIR",
-        help="keep what outlives a power cycle in this folder from run to run (default on the wall clock: "
-        ".automax/RACK next to the rack file; simulated: nowhere)",
-    )
-    parser.add_argument(
-        "--stimuli",
-        type=Path,
-        metavar="FILE",
-        help="play this stimuli file, by rack time (docs/stimuli.md)",
-    )
-    parser.add_argument(
-        "--report", type=Path, metavar="FILE.json", help="write how the run ended: tasks, commons, forces, operations"
-    )
+    state = f"keep what outlives a power cycle in this folder {state}"
+    parser.add_argument("--state", type=_folder, metavar="DIR", help=state)
+    stimuli = f"play this stimuli file, by rack time{stimuli}"
+    parser.add_argument("--stimuli", type=Path, metavar="FILE", help=stimuli)
+    parser.add_argument("--report", type=Path, metavar="FILE.json", help=f"write how the run ended{report}")
     add_native_arguments(parser)
     add_outside_argument(parser)
     add_ros_arguments(parser)
 
 
-def folder(text: str) -> Path:
-    """Return the folder that an option names."""
+def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("names no folder")
     return Path(text)
@@ -320,7 +318,5 @@ def watched_commons(config: RackConfig, texts: list[str] | None) -> tuple[Common
     Raises:
         UsageError: the rack has no such variable.
     """
-    try:
+    with naming("--watch"):
         return None if texts is None else tuple(watched(config, watch_list(texts)))
-    except UserError as error:
-        raise UsageError(f"--watch: {error.message}", error.hint) from error

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
+from automax_ros.cli.options.values import naming
 from automax_ros.cli.output.csv_input import CsvFault, CsvTable
 from automax_ros.cli.output.files import opened_for_writing, require_different_files
 from automax_ros.cli.output.screen import ProgressBar
@@ -208,10 +209,8 @@ def _parameters(arguments: argparse.Namespace) -> PulseParameters:
 
 
 def _number(option: str, text: str) -> int:
-    try:
+    with naming(option):
         return whole_number(text)
-    except ValueError as error:
-        raise UsageError(f"{option}: {error}") from None
 
 
 def _columns(table: CsvTable, arguments: argparse.Namespace) -> _Columns:

@@ -24,7 +24,7 @@ from typing import TextIO
 
 from automax_ros.cli.options.stimuli import StimuliRefused, entries_of
 from automax_ros.cli.options.task import add_target_arguments, check_task_file, require_clock, target_of
-from automax_ros.cli.options.values import add_watch_argument, seconds_above_0, watch_list
+from automax_ros.cli.options.values import add_watch_argument, naming, seconds_above_0, watch_list
 from automax_ros.cli.options.work import add_native_arguments, native_forms, print_native
 from automax_ros.cli.output.csv_input import CsvTable
 from automax_ros.cli.output.files import opened_for_writing, require_different_files
@@ -361,10 +361,8 @@ class _Trace:
 def _find_watched(lone: StandaloneTask, names: list[str] | None) -> list[LoneVariable]:
     if names is None:
         return lone.simple_variables()
-    try:
+    with naming("--watch"):
         found = [lone.variable(name) for name in names]
-    except NameFault as fault:
-        raise UsageError(f"--watch: {fault.message}", fault.hint) from fault
     return list({item.label: item for item in found}.values())
 
 

@@ -28,7 +28,7 @@ from automax_ros.cli.options.task import (
     require_clock,
     target_of,
 )
-from automax_ros.cli.options.values import number, whole_number
+from automax_ros.cli.options.values import naming, number, whole_number
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.numbers import INT16_MAX
@@ -198,7 +198,7 @@ def checked_program(arguments: argparse.Namespace) -> Program | None:
 
 
 def _print_rate(arguments: argparse.Namespace, program: Program | None) -> None:
-    from automax_ros.tuning.integrate_rate import Rate, RateFault
+    from automax_ros.tuning.integrate_rate import Rate
 
     period_ns = None
     if program is not None:
@@ -212,10 +212,8 @@ def _print_rate(arguments: argparse.Namespace, program: Program | None) -> None:
     elif arguments.tick_ms is not None:
         raise UsageError("--tick-ms needs --ticks or a FILE", "the scan time is ticks x tick")
     y, x = arguments.ki
-    try:
+    with naming("--ki"):
         rate = Rate.of(y, x, None if period_ns is None else period_ns / NS_PER_S)
-    except RateFault as fault:
-        raise UsageError(f"--ki: {fault.message}", fault.hint) from fault
     if arguments.json:
         print(json.dumps(rate.record(), indent=2, allow_nan=False))
     else:
