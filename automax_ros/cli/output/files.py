@@ -108,6 +108,23 @@ def write_text(path: Path, text: str) -> None:
         raise _unwritable(path, error) from error
 
 
+def write_whole(path: Path, data: bytes, *, over: bool, hint: str | None = None) -> None:
+    """Write the whole file or nothing; unless ``over``, never over a file that was created meanwhile.
+
+    Raises:
+        UsageError: it cannot be written.
+    """
+    try:
+        if over:
+            with atomic_write(path) as place:
+                place.write_bytes(data)
+        else:
+            with path.open("xb") as stream:
+                stream.write(data)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror or error}", hint) from error
+
+
 def _unwritable(path: Path, error: Exception) -> UsageError:
     return UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}")
 

@@ -13,8 +13,9 @@ import sys
 from pathlib import Path
 
 from automax_ros.cli.options.values import add_output_argument
+from automax_ros.cli.output.files import write_whole
 from automax_ros.cli.output.screen import print_diagnostics
-from automax_ros.cli.racks.new import require_free, write_rack_file
+from automax_ros.cli.racks.new import require_free
 from automax_ros.core.diagnostics import SourceText, has_errors
 from automax_ros.core.text import count_of, quoted
 from automax_ros.core.user_error import UsageError
@@ -56,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.output is None:
         sys.stdout.write(imported.text)
     else:
-        write_rack_file(arguments.output, imported.text, force=arguments.force)
+        write_whole(arguments.output, imported.text.encode(), over=arguments.force)
         counts = ((len(found.tasks), "task"), (len(found.commons), "common"))
         print(f"wrote {arguments.output}: {', '.join(count_of(number, thing) for number, thing in counts)}")
     name = str(arguments.output or "the rack file")

@@ -14,9 +14,9 @@ from pathlib import Path
 from automax_ros.cli.options.rack import DEFAULT_RACK_FILE
 from automax_ros.cli.options.task import is_rack_file, tick_option
 from automax_ros.cli.options.values import add_output_argument
+from automax_ros.cli.output.files import write_whole
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.core.diagnostics import has_errors
-from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import count_of, quoted
 from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.checks.tasks import findings_by_task, with_findings
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_free(output, force=arguments.force)
     try:
         drafted = draft(folder, output.parent, tick_ns)
-        write_rack_file(output, drafted.text(arguments.processors), force=arguments.force)
+        write_whole(output, drafted.text(arguments.processors).encode(), over=arguments.force)
     except DraftFault as fault:
         raise UsageError(fault.message, fault.hint) from fault
     counts = ((arguments.processors, "Processor"), (len(drafted.tasks), "task"), (len(drafted.commons), "common"))
@@ -72,19 +72,6 @@ def require_free(output: Path, *, force: bool) -> None:
         raise UsageError(f"{output}: a rack file ends in .yaml or .yml")
     if not force and (output.exists() or output.is_symlink()):
         raise UsageError(f"{output} exists already", "--force writes over it")
-
-
-def write_rack_file(output: Path, text: str, *, force: bool) -> None:
-    """Write the whole file or nothing; without ``force`` never overwrite one that was created meanwhile."""
-    try:
-        if force:
-            with atomic_write(output) as path:
-                path.write_text(text, encoding="utf-8")
-        else:
-            with output.open("x", encoding="utf-8") as stream:
-                stream.write(text)
-    except OSError as error:
-        raise UsageError(f"{output} cannot be written: {error.strerror or error}") from error
 
 
 def _has_errors(output: Path, drafted: Draft) -> bool:

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from automax_ros.cli.options.task import TaskTarget, add_target_arguments, check_text, require_task, target_of
+from automax_ros.cli.output.files import write_whole
 from automax_ros.core.diagnostics import has_errors
-from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.old_plants.sources import Converted, convert
@@ -23,6 +23,7 @@ from automax_ros.rackfile.reading.files import FileFault, read_bytes
 
 KEPT_SUFFIX = ".orig"
 """Suffix that --write appends to the name of the old file."""
+_NOTHING_AFTER = "nothing after this file was written"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,11 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
             wrong += 1
     for path, result in converted:
         if arguments.write and result.changed:
-            _write(path.with_name(path.name + KEPT_SUFFIX), read_bytes(path), over=False)
-            _write(path, result.data, over=True)
+            write_whole(path.with_name(path.name + KEPT_SUFFIX), read_bytes(path), over=False, hint=_NOTHING_AFTER)
+            write_whole(path, result.data, over=True, hint=_NOTHING_AFTER)
         elif arguments.output is not None:
             _make(arguments.output)
-            _write(places[path], result.data, over=False)
+            write_whole(places[path], result.data, over=False, hint=_NOTHING_AFTER)
     changed = sum(result.changed for _, result in converted)
     if changed and not arguments.write and arguments.output is None:
         hint = "--write or --output DIR"
@@ -103,16 +104,3 @@ def _make(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror or error}") from error
-
-
-def _write(path: Path, data: bytes, *, over: bool) -> None:
-    try:
-        if over:
-            with atomic_write(path) as temporary:
-                temporary.write_bytes(data)
-        else:
-            with path.open("xb") as stream:
-                stream.write(data)
-    except OSError as error:
-        reason = error.strerror or error
-        raise UsageError(f"{path} cannot be written: {reason}", "nothing after this file was written") from error
