@@ -383,8 +383,10 @@ class ActionParser(argparse.ArgumentParser):
         return super().format_help() + (f"\n{below}\n" if below else "")
 
 
-def add_actions(parser: argparse.ArgumentParser, *, required: bool = True) -> argparse._SubParsersAction[ActionParser]:
-    """Add all actions with their arguments."""
+def add_actions(
+    parser: argparse.ArgumentParser, *, required: bool = True, timeout_s: str = DEFAULT_TIMEOUT_S
+) -> argparse._SubParsersAction[ActionParser]:
+    """Add all actions with their arguments; ``timeout_s`` is the default of ``--timeout``."""
     actions = parser.add_subparsers(
         title="actions", metavar="ACTION", dest="action", required=required, parser_class=ActionParser
     )
@@ -392,17 +394,17 @@ def add_actions(parser: argparse.ArgumentParser, *, required: bool = True) -> ar
         own = actions.add_parser(name, help=action.help, description=action.help)
         own.more = action.more
         action.add_arguments(own)
-        add_common(own)
+        add_common(own, timeout_s)
     return actions
 
 
-def add_common(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that all actions have."""
+def add_common(parser: argparse.ArgumentParser, timeout_s: str = DEFAULT_TIMEOUT_S) -> None:
+    """Add the arguments that all actions have; ``timeout_s`` is the default of ``--timeout``."""
     parser.add_argument("--json", action="store_true", help="print the answers for programs to read")
     parser.add_argument(
         "--timeout",
         type=seconds_above_0,
         metavar="S",
-        default=DEFAULT_TIMEOUT_S,
-        help=f"seconds to look for the rack, and to wait for each answer (default: {DEFAULT_TIMEOUT_S})",
+        default=timeout_s,
+        help=f"seconds to look for the rack, and to wait for each answer (default: {timeout_s})",
     )

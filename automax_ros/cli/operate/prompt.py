@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from automax_ros.cli.operate.actions import ACTIONS, ServiceCall, add_actions
 from automax_ros.cli.operate.ctl import RackSession, connected
 from automax_ros.cli.shell.prompt import PromptInterrupt, edit_lines, typed_lines
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.user_error import UserError
 
 _QUIT = ("quit", "exit")
@@ -45,7 +46,7 @@ class _Shell:
         self._session, self._given = session, arguments
         self._names: list[str] | None = None
         self._parser = argparse.ArgumentParser(prog="automax ctl", usage="ACTION ...", add_help=False)
-        add_actions(self._parser)
+        add_actions(self._parser, timeout_s=f"{arguments.timeout / NS_PER_S:g}")
 
     def execute_all(self, lines: Iterable[str]) -> bool:
         """Carry out lines until their end or quit; return whether one failed."""

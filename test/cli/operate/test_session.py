@@ -41,6 +41,7 @@ class Rack:
     def __init__(self, **values: str) -> None:
         self.values, self.asked, self.alone_ns, self.racks = values, [], [], 1
         self.answers: dict[str, Any] = {}
+        self.waits_ns: set[int] = set()
 
     def find(self, _: int, alone_ns: int = 0) -> None:
         self.alone_ns.append(alone_ns)
@@ -51,7 +52,8 @@ class Rack:
         if racks > 1:
             raise NotOperable(f"{racks} racks")
 
-    def call(self, _: Any, name: str, request: Any, __: int) -> Any:
+    def call(self, _: Any, name: str, request: Any, wait_ns: int) -> Any:
+        self.waits_ns.add(wait_ns)
         if name in self.answers:
             return self.answers[name]
         if name == "status":
@@ -198,9 +200,10 @@ def test_a_prompt_goes_on_after_errors_and_ends_with_its_input(monkeypatch, caps
     monkeypatch.setattr("automax_ros.cli.operate.prompt.connected", Connected)
     lines = "get REF%\nfoo\nset 'REF%\npress REF%\n\n# a remark\nset REF%=7\nset NIL%=1\nquit\nset REF%=8\n"
     monkeypatch.setattr("sys.stdin", io.StringIO(lines))
-    code = run_shell(argparse.Namespace(rack="PM1", timeout=10**9))
+    code = run_shell(argparse.Namespace(rack="PM1", timeout=30 * 10**9))
     done_text = capsys.readouterr()
     assert (code, rack.values["REF%"]) == (1, "7")
+    assert rack.waits_ns == {30 * 10**9}, "each line waits as long as the prompt"
     assert done_text.out == "REF% = 5\nset REF% = 7: done\n"
     assert "invalid choice: 'foo'" in done_text.err
     assert "No closing quotation" in done_text.err

@@ -11,7 +11,7 @@ import pytest
 
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.replay.engine import ReplayOptions, replay
-from system.support import COMMAND, PATIENCE_S, RACKS, TYPES, Automax, Client, automax, automax_here, wait_until
+from system.support import COMMAND, PATIENCE_S, RACKS, TYPES, Automax, Client, automax_here, wait_until
 
 OPERATED = RACKS / "operated" / "rack.yaml"
 READY = "Ctrl-C ends the run"
@@ -58,9 +58,9 @@ def ctl_of(rack: str, *arguments: str | Path):
 
 @pytest.mark.usefixtures("rack", "one_client")
 def test_a_rack_is_operated_from_another_process(tmp_path):
-    watched = automax(
-        "ctl", "OPERATED", "watch", "REF%", "COUNT!", "--every", "0.1", "--duration", "1.5", "--json", *PATIENT
-    )
+    with Automax("ctl", "OPERATED", "watch", "REF%", "COUNT!", "--every", "0.1", "--json", *PATIENT) as watch:
+        wait_until(lambda: "".join(watch.out).count("COUNT!") > 3)
+        watched = watch.end(signal.SIGINT)
     told = [json.loads(line) for line in watched.out.splitlines()]
     assert watched.code == 0
     assert [item["name"] for item in told].count("REF%") == 1, "told once: it does not change"
@@ -215,7 +215,7 @@ def test_a_prompt_stays_connected_and_a_press_is_seen_by_the_tasks(ros_domain_id
         rack.wait_for_line(READY)
         wait_until(lambda: ctl_of("LINE4", "status").code == 0)  # all processes have met
         lines = "get START_PB@\npress START_PB@ --for 0.05\nget 'START*' NIL@\nget 'RING_9.*'\nstatus\n"
-        command = [*COMMAND, "ctl", "LINE4", "shell"]
+        command = [*COMMAND, "ctl", "LINE4", "shell", *PATIENT]
         shell = subprocess.run(command, input=lines, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
         assert shell.returncode == 1
         assert "START_PB@ = FALSE\npress START_PB@: done\nrack LINE4:" in shell.stdout
