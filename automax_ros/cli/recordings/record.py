@@ -22,7 +22,7 @@ from automax_ros.cli.options.values import add_output_argument, seconds_above_0
 from automax_ros.cli.output.screen import StatusLine
 from automax_ros.cli.output.signals import StopRequest, stop_signals
 from automax_ros.cli.run.saving import DiskSync
-from automax_ros.cli.run.status import recorded_size
+from automax_ros.cli.run.status import NO_SCAN, recorded_size
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.text import count_of, did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_S
@@ -273,8 +273,8 @@ class _Session:
         self._line.message(f"recorded {folder}: {recorded_size(folder)}")
         empty = self._expects_scans and not recording.executable
         if empty and recording.first_stamp is not None:
-            which = "scan that can be executed again" if recording.scans else "scan"
-            self._line.message(f"  it holds no {which}: nothing of it can be replayed; do the tasks run?")
+            unfit = "  no scan of it can be executed again: nothing of it can be replayed"
+            self._line.message(unfit if recording.scans else NO_SCAN)
         return 1 if recording.ended is not None or recording.first_stamp is None or empty else 0
 
 

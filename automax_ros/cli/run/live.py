@@ -21,8 +21,8 @@ from automax_ros.rack.rack import Rack
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.ros.base.node import follows_clock
 from automax_ros.ros.distributed.bus import LEAD_NS, ProcessLayout
+from automax_ros.ros.live_rack import LiveRack
 from automax_ros.ros.nodes.rack import RackNode
-from automax_ros.ros.rack_nodes import LiveRack
 from automax_ros.ros.setup.discovery import range_text
 from automax_ros.ros.setup.process import RosProcess
 from automax_ros.scenario.report import OperationLog
@@ -126,6 +126,8 @@ class LiveSession:
             self._ending.close()
         if self.has_begun:
             self._report_end()
+        elif self.plan.record is not None:
+            self._display.report_recording(self.plan.record, complete=not self._recording.failed)
         unsaved = self._state.failed and self.plan.state is not None
         failed = self._recording.failed or unsaved or self._stimulation.refused > 0
         return conclude(self.rack, self.plan, report, failed=failed)

@@ -93,6 +93,10 @@ def merged_summary(parts: Sequence[Summary]) -> Summary:
     return Summary(parts[0].seconds, True, rows, tuple(note for part in parts for note in part.notes), parts[0].values)
 
 
+NO_SCAN = "  it holds no scan: nothing of it can be replayed; do the tasks run?"
+"""The line about a recording without a scan."""
+
+
 def recorded_size(folder: Path) -> str:
     """Return the size of a recording's folder in MB; its disk may have disappeared while the rack ran."""
     try:
@@ -159,8 +163,14 @@ class StatusDisplay:
             Summary(rack.now_ns / NS_PER_S, self._live, tuple(self._rows()), tuple(self._notes()), self._values(), took)
         )
         if bag is not None:
-            rest = "" if complete else f", not to the end of the run; to complete the file: automax bag repair {bag}"
-            self.message(f"recorded {bag}: {recorded_size(bag)}{rest}")
+            self.report_recording(bag, complete=complete)
+
+    def report_recording(self, bag: Path, *, complete: bool) -> None:
+        """Show the size of the run's recording, and what it lacks."""
+        rest = "" if complete else f", not to the end of the run; to complete the file: automax bag repair {bag}"
+        self.message(f"recorded {bag}: {recorded_size(bag)}{rest}")
+        if self._rack.tasks and not any(item.scans for item in self._rack.statistics.values()):
+            self.message(NO_SCAN)
 
     def _rows(self) -> Iterator[str]:
         for task in self._rack.tasks:

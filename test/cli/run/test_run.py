@@ -287,6 +287,14 @@ def test_fault_ends_the_run(automax):
     assert "recorded bag: " in result.out
 
 
+def test_a_recording_without_a_scan_is_told(run, automax):
+    automax.write("stop.yaml", "- {at: 0, stop_all: true}\n")
+    result = run("--duration", "0.1", "--record", "bag", "--stimuli", "stop.yaml")
+    assert result.code == 0
+    assert result.out.endswith("MB\n  it holds no scan: nothing of it can be replayed; do the tasks run?\n")
+    assert automax("bag", "info", "--check", "bag").code == 1
+
+
 def test_existing_folder_is_not_recorded_into(run, automax):
     (automax.folder / "bag").mkdir()
     result = run("--duration", "1", "--record", "bag")
