@@ -1,4 +1,4 @@
-"""A rack as ROS 2 nodes: embedded in any program (``RackNodes``), or as a process (``LiveRack``).
+"""A rack as ROS 2 nodes, embedded in any program; ``LiveRack`` (``ros/live_rack``) is one as a process.
 
 ``RackNodes`` uses the context and the executor of the program::
 
@@ -9,13 +9,6 @@
     nodes.start()
     executor.spin()        # serves your nodes and the rack's; a separate thread scans
     nodes.close()
-
-``LiveRack`` has its own context and executor, and three threads. The calling one scans, at absolute deadlines
-(``Pacer``), without ROS timers (they skip ticks on a busy host). A second one receives messages and requests
-(``MessageIntake``), between two scans. A third one spins the executor, which only handles events of the graph. Measured
-(bench/ros.py): the loop's lateness is the host's own in either form; a loop of ``time.sleep`` without ROS oversleeps by
-1 to 4 ms as often (the host of a virtual machine takes its processor away, with a period of about 0.51 s among
-others). With a separate thread, scans are not delayed by a long message, a long conversion or a queue of events.
 """
 
 from __future__ import annotations
@@ -34,7 +27,6 @@ from typing import Any
 
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.utilities import get_default_context
 
 from automax_ros.core.ticks import NS_PER_S
@@ -51,7 +43,6 @@ from automax_ros.ros.base.node import SIM_TIME, ModuleNode, RackContext, RackLoc
 from automax_ros.ros.distributed.bus import DistributedMemory, ProcessLayout
 from automax_ros.ros.distributed.forwarding import RequestForwarder, operate_name
 from automax_ros.ros.distributed.presence import PresencePublisher
-from automax_ros.ros.intake.guard import MOST_SHOWN
 from automax_ros.ros.intake.intake import MessageIntake
 from automax_ros.ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.ros.nodes.operator import OperatorNode, OperatorServices
@@ -59,10 +50,9 @@ from automax_ros.ros.nodes.processor import ProcessorNode
 from automax_ros.ros.nodes.rack import Follower, RackLifecycle, RackNode
 from automax_ros.ros.nodes.registry import nodes_of, run_facts
 from automax_ros.ros.nodes.start_parameters import tune_at_start, without_use
-from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments, split_arguments
-from automax_ros.ros.setup.environment import RosUnavailable
+from automax_ros.ros.setup.arguments import RosArguments, split_arguments
 from automax_ros.ros.setup.parameter_files import RosArgumentsError
-from automax_ros.ros.setup.process import RosProcess, take_out
+from automax_ros.ros.setup.process import take_out
 from automax_ros.runtime.health import Health
 from automax_ros.runtime.time.pacer import START_LEAD_NS
 from automax_ros.runtime.time.simulated_pacer import SimulatedTime
@@ -93,9 +83,6 @@ DELIVERY_TO_RECORDER_NS = 20 * NS_PER_S
 _Beginning = tuple[Sequence[tuple[str, Value]], "Callable[[], None] | None"]
 """The arguments of ``Rack.start``."""
 _TOGETHER = "a distributed rack keeps the wall clock, by which its processes agree"
-
-
-RCLError: type[Exception] = rclpy_implementation.RCLError
 
 
 class RackNodes:
@@ -411,80 +398,3 @@ def _load_rack(path: Path, arguments: RosArguments) -> Rack:
         raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
     config = replace(result.config, namespace=arguments.placed(result.config.namespace))
     return Rack(config, stopwatch=time.monotonic_ns)
-
-
-class LiveRack:
-    """A rack and its nodes, as this process.
-
-    Create it, ``start`` it, then ``run``; always call ``close``. ``on_idle`` or a callback sets ``stopping``.
-    """
-
-    def __init__(
-        self,
-        rack: Rack,
-        arguments: RosArguments = NO_ARGUMENTS,
-        process_layout: ProcessLayout | None = None,
-        *,
-        process: RosProcess | None = None,
-        manager: RackNode | None = None,
-        simulated: SimulatedTime | None = None,
-    ) -> None:
-        """Create all nodes.
-
-        Args:
-            rack: a rack that was not started.
-            arguments: the ROS arguments of the nodes.
-            process_layout: the processes of a distributed rack, as for ``RackNodes``.
-            process: the caller's context and executor, which the caller closes; the rack's own if None.
-            manager: the caller's node ``rack``, as for ``RackNodes``.
-            simulated: simulated time, as for ``RackNodes``.
-
-        Raises:
-            RosUnavailable: ROS cannot be initialised, or refuses a node, a topic or a service.
-        """
-        self.rack = rack
-        self.stopping = False
-        self._process = RosProcess(arguments) if process is None else process
-        self._owns_process = process is None
-        self._executor, context = self._process.executor, self._process.context
-        try:
-            with self._process.resting():
-                self.nodes = RackNodes(
-                    rack,
-                    context=context,
-                    arguments=arguments,
-                    manager=manager,
-                    process_layout=process_layout,
-                    simulated=simulated,
-                )
-                self.nodes.add_to(self._executor)
-        except RCLError as error:
-            self._leave()
-            text = str(error).split(", at /", 1)[0][:MOST_SHOWN]
-            hint = "do not give two of its topics or services one name (-r FROM:=TO)" if arguments.given else None
-            raise RosUnavailable(f"the rack's nodes cannot be made: {text}", hint) from error
-        except Exception:
-            self._leave()
-            raise
-        self.notes = self.nodes.notes
-        if process is None:
-            self._process.spin(self.nodes.nodes[0].guard)
-        self.stream, self.health, self.bus = self.nodes.stream, self.nodes.health, self.nodes.bus
-
-    def start(self, settings: list[tuple[str, Value]], first: Callable[[], None] | None = None) -> None:
-        """Begin the stream and put the rack into RUN (``Rack.start``); rack time 0 follows shortly."""
-        self.nodes.start(settings, first, paced=False)
-
-    def run(self, duration_ns: int | None, on_idle: Callable[[int], None]) -> None:
-        """Run the rack until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""
-        self.nodes.run(duration_ns, on_idle, lambda: self.stopping)
-
-    def close(self) -> None:
-        """Stop the tasks, publish the last messages, destroy the nodes, and shut ROS down unless the caller does."""
-        with self._process.resting():
-            self.nodes.close(spun=False)
-        self._leave()
-
-    def _leave(self) -> None:
-        if self._owns_process:
-            self._process.close()

@@ -73,9 +73,9 @@ def _config(text: str, path: str, numbers: tuple[tuple[PlantNumber, str], ...] =
 
 
 @lru_cache(maxsize=1)
-def _installation(blueprint: RackTemplate) -> Installation:
-    config = _config(blueprint.text, blueprint.path)
-    return Installation(config, sources=dict(blueprint.sources), native=blueprint.native)
+def _installation(template: RackTemplate) -> Installation:
+    config = _config(template.text, template.path)
+    return Installation(config, sources=dict(template.sources), native=template.native)
 
 
 _SLICE_NS = 100 * NS_PER_MS
@@ -100,7 +100,7 @@ class Stimuli:
 class Plan:
     """The common part of all runs of a sweep."""
 
-    blueprint: RackTemplate
+    template: RackTemplate
     quantities: tuple[Quantity, ...]
     measures: tuple[Measure, ...]
     duration_ns: int
@@ -158,7 +158,7 @@ def _run(
     attend: Callable[[Rack], Callable[[], None]] | None,
     should_stop: Callable[[], bool],
 ) -> RunOutcome:
-    rack = plan.blueprint.rack(beginning.plants)
+    rack = plan.template.rack(beginning.plants)
     stimulation = _stimulation(rack, plan.stimuli)
     for item in beginning.tunings:
         rack.tune(rack.task(item.task), item.name, item.value)
@@ -251,7 +251,7 @@ def run_sweep(
         return list(_rows(done, firsts[done.piece.name]))
 
     if where.scheduler is None:
-        plan.blueprint.prepare()
+        plan.template.prepare()
     found = run_jobs(pieces, where, lambda done: on_rows(rows_of(done)), should_stop)
     return [row for done in found for row in rows_of(done)]
 

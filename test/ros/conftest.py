@@ -31,7 +31,7 @@ def context(ros_domain_id):
 @pytest.fixture
 def live(request, ros_domain_id, tmp_path):
     """The rack of a test file, live: of its CONFIG, a path, or of its RACK and SOURCES, texts."""
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     config = getattr(request.module, "CONFIG", tmp_path / "rack.yaml")
     for name, text in getattr(request.module, "SOURCES", {}).items():

@@ -32,7 +32,7 @@ class Scans(Observer):
 @pytest.fixture
 def live(ros_domain_id):
     """A live rack that is closed at the end."""
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     made = LiveRack(rack_at(TYPES, stopwatch=time.perf_counter_ns))
     yield made
@@ -122,7 +122,7 @@ def test_single_threaded_executor_stands_in(ros_domain_id, monkeypatch):
     from rclpy.executors import SingleThreadedExecutor
     from std_msgs.msg import Int16
 
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     monkeypatch.setattr(executor_module, "dispatches", lambda *_: False)
     live = LiveRack(rack_at(TYPES))
@@ -171,7 +171,7 @@ def test_executor_that_dispatches_is_found(ros_domain_id):
 
 
 def test_closing_before_the_start_is_clean(ros_domain_id):
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     live = LiveRack(rack_at(TYPES))
     live.close()
@@ -179,7 +179,7 @@ def test_closing_before_the_start_is_clean(ros_domain_id):
 
 
 def test_two_topics_of_one_name_are_refused_with_the_reason(ros_domain_id):
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
     from automax_ros.ros.setup.arguments import split_arguments
     from automax_ros.ros.setup.environment import RosUnavailable
 

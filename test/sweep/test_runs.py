@@ -172,7 +172,7 @@ def test_a_rack_with_another_plant_is_that_of_an_edited_file(tmp_path: Path):
     by_hand = plan_of(Rack(other), [], "final(RPM) max(CUR_REF%) rms(ARM_V)", "1.5")
     assert varied == run_point(by_hand, ())
     assert varied.fault == ""
-    assert varied != run_point(replace(by_hand, blueprint=plan.blueprint), ())
+    assert varied != run_point(replace(by_hand, template=plan.template), ())
 
 
 def test_numbers_that_contradict_each_other_are_a_fault_of_the_run(tmp_path: Path):

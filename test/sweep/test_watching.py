@@ -17,7 +17,7 @@ LENGTH_MS = 40
 
 
 @pytest.fixture(scope="module")
-def blueprint(tmp_path_factory: pytest.TempPathFactory) -> RackTemplate:
+def template(tmp_path_factory: pytest.TempPathFactory) -> RackTemplate:
     return RackTemplate.of(rack_in(Path(tmp_path_factory.mktemp("watching"))))
 
 
@@ -27,12 +27,12 @@ WINDOWS = st.tuples(st.integers(0, LENGTH_MS - 1), st.integers(1, LENGTH_MS)).fi
 
 @given(WRITES, WINDOWS, st.booleans())
 def test_a_window_sees_what_holds_within_it(
-    blueprint: RackTemplate, writes: list[tuple[int, int]], window: tuple[int, int], looks: bool
+    template: RackTemplate, writes: list[tuple[int, int]], window: tuple[int, int], looks: bool
 ):
     start, end = window
     times = f"from={start / 1000} to={end / 1000}"
     text = " ".join(f"{name}(SLOW, {times})" for name in ("mean", "min", "max", "final", "itae", "overshoot"))
-    rack = blueprint.rack({})
+    rack = template.rack({})
     measures = read_measures(text, rack.config, NS_PER_S)
     rack.start()
     watch = Watch(rack, measures, NS_PER_S)

@@ -89,6 +89,12 @@ def _plotjuggler(folder: Path) -> Iterator[tuple[str, str]]:
         yield topic, f"{of_joint}[]" if joint and of_joint in JOINT_FIELDS else field.replace("/", ".")
 
 
+def shown_in_vain(folder: Path, types: dict[str, list[str]]) -> set[tuple[str, str]]:
+    """The topics and fields that the layouts of a folder show and that the graph, topics with types, does not have."""
+    places = {(topic, field) for topic, fields in shown(folder).items() for field in fields}
+    return {(topic, field) for topic, field in places if topic not in types or not has_field(types[topic][0], field)}
+
+
 def has_field(type_name: str, field: str) -> bool:
     """Whether a message type has a field such as ``wrench.force.x`` or ``velocity[]``."""
     from automax_ros.ros.base.qos import message_class

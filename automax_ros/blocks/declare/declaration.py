@@ -24,6 +24,7 @@ Booleans are ``bool``, INTEGERs ``int``, REALs and coefficients ``float``.
 from __future__ import annotations
 
 import enum
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import floor
@@ -219,7 +220,7 @@ class Fault:
     code: str = "AMX4082"
 
 
-class Rule:
+class Rule(ABC):
     """A rule over the set of parameters that a CALL gives, beyond those of each parameter."""
 
     sentence: ClassVar[str]
@@ -230,9 +231,9 @@ class Rule:
         """The rule as a sentence for the documentation."""
         return self.sentence.format(rule=self)
 
+    @abstractmethod
     def fault(self, given: Mapping[str, Given]) -> Fault | None:
         """Return the fault of the given parameters, which are by keyword in the order of the CALL."""
-        raise NotImplementedError
 
 
 Bound = Callable[[float, Mapping[str, float]], float]

@@ -158,7 +158,7 @@ def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
         where = Workers(1)
     native = native_forms(arguments, arguments.duration * len(points) // where.processes)
     plan = Plan(RackTemplate.of(rack, native), quantities, measures, arguments.duration, stimuli)
-    first = _read("--vary", lambda: plan.blueprint.rack(plan.beginning(points[0]).plants))
+    first = _read("--vary", lambda: plan.template.rack(plan.beginning(points[0]).plants))
     if arguments.verbose:
         print_native(first.operations.installation.native.values())
     wanted = Wanted(arguments, rack.installed, measures.index(best), greatest=greatest)

@@ -20,7 +20,8 @@ from typing import TextIO
 from automax_ros.cli.options.task import add_call_arguments, add_target_arguments, chosen_calls
 from automax_ros.cli.options.values import number, whole_number
 from automax_ros.cli.output.files import opened_for_writing, require_different_files
-from automax_ros.cli.tasks.tune_info import checked_program, frequency_text
+from automax_ros.cli.tasks.tune_info import checked_program
+from automax_ros.cli.tasks.tune_info_text import frequency_text
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.text import table
 from automax_ros.core.user_error import UsageError

@@ -1,4 +1,4 @@
-"""Short builders of Python syntax trees, for the compiler."""
+"""Short builders of Python syntax trees, for the compiler, and the functions that such trees become."""
 
 from __future__ import annotations
 

@@ -19,7 +19,8 @@ from automax_ros.rack.operator.requests import VERBS, Concerns
 from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.node import ModuleNode
 from automax_ros.ros.distributed.bus import DistributedMemory
-from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, conclude
+from automax_ros.ros.intake.guard import conclude
+from automax_ros.ros.intake.service_requests import DeferredResponse, Respond
 
 ANSWER_S = 2.0
 """Seconds to wait for another process."""

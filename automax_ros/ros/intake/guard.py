@@ -78,11 +78,7 @@ class RequestGuard:
         reason = str(error)[:MOST_SHOWN]
         if kind is SetParameters:
             return kind.Response(results=[SetParametersResult(successful=False, reason=reason)])
-        response = _refusal(kind, None, reason)
-        for field, value in (("ok", False), ("reason", reason), ("success", False), ("message", reason)):
-            if hasattr(response, field):
-                setattr(response, field, value)
-        return response
+        return conclude(_refusal(kind, None, reason), ok=False, reason=reason)
 
     def serve(self, executor: Any, context: Context, seconds: float) -> None:
         """Spin an executor once, waiting at most ``seconds`` for work, and report exceptions.
@@ -123,3 +119,11 @@ def _refusal(kind: Any, request: Any, reason: str) -> Any:
     if kind is SetParameters:
         return kind.Response(results=[result] * len(request.parameters))
     return kind.Response(result=result) if kind is SetParametersAtomically else kind.Response()
+
+
+def conclude(response: Any, *, ok: bool, reason: str) -> Any:
+    """Fill in the outcome of a request; a message of a success stays. Return the response."""
+    for name, value in (("ok", ok), ("success", ok), ("reason", reason), ("message", reason)):
+        if hasattr(response, name) and (name != "message" or reason):
+            setattr(response, name, value)
+    return response

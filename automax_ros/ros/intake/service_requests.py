@@ -267,11 +267,3 @@ class Conversion:
             item = Conversion(kind).to_python
             setattr(message, name, [item(sequence.data + place * size) for place in range(sequence.size)])
         return message
-
-
-def conclude(response: Any, *, ok: bool, reason: str) -> Any:
-    """Fill in the outcome of a request; a message of a success stays. Return the response."""
-    for name, value in (("ok", ok), ("success", ok), ("reason", reason), ("message", reason)):
-        if hasattr(response, name) and (name != "message" or reason):
-            setattr(response, name, value)
-    return response

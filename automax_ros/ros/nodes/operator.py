@@ -22,7 +22,8 @@ from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import message_class
 from automax_ros.ros.clients.recorded_run import ALONE_NS, racks_of
 from automax_ros.ros.distributed.forwarding import RequestForwarder
-from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred, conclude
+from automax_ros.ros.intake.guard import conclude
+from automax_ros.ros.intake.service_requests import DeferredResponse, Respond, allow_deferred
 from automax_ros.ros.nodes.tables import task_fields
 
 Conclude = Callable[[Any, Any, Exception | None], Any]

@@ -1,4 +1,7 @@
-"""The verbs that write values, as the process does: set, ramp, sine, square. For a rack and for a lone task."""
+"""What readers of all verbs share, and the verbs that write values as the process does: set, ramp, sine, square.
+
+These are for a rack and for a lone task; those that operate a rack are in ``rack_verbs``.
+"""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ STEP_NS = 20 * NS_PER_MS
 @pytest.fixture
 def made(ros_domain_id):
     """Live racks in simulated time, or with ROS arguments; closed at the end."""
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     lives: list[LiveRack] = []
 

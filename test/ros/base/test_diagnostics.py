@@ -207,7 +207,7 @@ def test_a_basic_task_that_has_done_its_work_is_well(ros_domain_id, client, tmp_
     """One that has come to a STOP is not."""
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     for name, last in (("ONCE", "END"), ("HALT", "STOP\n30 END")):
         (tmp_path / f"{name}.BAS").write_text(f"10 COMMON NIL%\n20 {last}\n")

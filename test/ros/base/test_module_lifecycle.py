@@ -36,7 +36,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def live(ros_domain_id, folder):
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     made = LiveRack(Rack(load(folder / "rack.yaml").config))
     made.told = Told()
@@ -145,7 +145,7 @@ def test_an_error_of_ours_stops_everything(live, manager, monkeypatch):
 
 
 def test_a_critical_task_does_not_stop_alone(ros_domain_id, client):
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     live = LiveRack(Rack(load(RACKS / "operated" / "rack.yaml").config))
     try:
@@ -159,7 +159,7 @@ def test_a_critical_task_does_not_stop_alone(ros_domain_id, client):
 
 
 def test_without_an_operator_nobody_may_ask(ros_domain_id, client):
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     live = LiveRack(Rack(load(TYPES).config))
     try:

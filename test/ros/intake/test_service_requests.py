@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def live(ros_domain_id):
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     made = LiveRack(Rack(load(TYPES).config))
     made.start([])

@@ -16,7 +16,7 @@ from ros.support import until
 @pytest.fixture
 def started(ros_domain_id):
     """A live rack with ROS arguments, and after them those with which a second one begins."""
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
 
     lives: list[LiveRack] = []
 

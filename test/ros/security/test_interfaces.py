@@ -27,7 +27,7 @@ def config_of(path):
 
 @pytest.mark.parametrize("path", [LINE, OPERATED], ids=lambda path: path.parent.name)
 def test_it_is_what_strangers_see_of_a_rack_that_runs(client, path):
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
     from automax_ros.ros.security.profiles import enclave_of_rack
 
     config = config_of(path)
@@ -55,7 +55,7 @@ def test_it_is_what_strangers_see_of_a_rack_that_runs(client, path):
 
 
 def test_a_recorder_needs_no_more_than_its_enclave_allows(client, tmp_path):
-    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.live_rack import LiveRack
     from automax_ros.ros.security.profiles import enclave_of_rack, recorder_of
 
     config = config_of(LINE)
