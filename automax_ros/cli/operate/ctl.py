@@ -200,7 +200,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.action == SHELL:
         from automax_ros.cli.operate.prompt import run_shell
 
-        return run_shell(arguments)
+        return run_shell(arguments, connected)
     with stop_signals() as stop, connected(arguments, lambda: stop.requested) as session:
         from automax_ros.ros.clients.rack_client import Interrupted
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING
 
 from automax_ros.cli.operate.actions import ACTIONS, ServiceCall, add_actions
-from automax_ros.cli.operate.ctl import RackSession, connected
 from automax_ros.cli.shell.prompt import PromptInterrupt, edit_lines, typed_lines
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.user_error import UserError
@@ -19,9 +20,16 @@ _HELP = "help"
 
 _STATUS = ServiceCall("status", "automax_msgs/ReadStatus", {"home_only": True})
 
+if TYPE_CHECKING:
+    from automax_ros.cli.operate.ctl import RackSession
 
-def run_shell(arguments: argparse.Namespace) -> int:
+    Connected = Callable[[argparse.Namespace, Callable[[], bool]], AbstractContextManager[RackSession]]
+
+
+def run_shell(arguments: argparse.Namespace, connected: Connected) -> int:
     """Carry out lines of standard input until its end or ``quit``; 1 where a line of a script failed.
+
+    ``connected`` opens the session with the rack.
 
     Raises:
         UsageError: there is no such rack, several have the name, or it cannot be operated.

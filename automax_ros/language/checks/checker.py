@@ -25,41 +25,6 @@ from automax_ros.language.tree.tree import Call, Declaration, End, Label, Module
 from automax_ros.language.tree.walk import arguments_of, bodies, expressions_of, statements_in_order, variables_in
 
 Use = tuple[Span, "int | None"]
-
-
-def check_sharing(context: Context, layout: TaskLayout) -> None:
-    """Warn once for every latched common that blocks and BASIC statements of the scan both use.
-
-    Statements before SCAN_LOOP do not count: they run before the first latch, and the manual places them there.
-    """
-    by_blocks: dict[str, Use] = {}
-    by_basic: dict[str, Use] = {}
-    for statement, line, after in layout.numbered():
-        if not after:
-            continue
-        if isinstance(statement, Call):
-            expressions = tuple(argument.value for argument in arguments_of(statement))
-            uses = by_blocks
-        else:
-            expressions, uses = expressions_of(statement), by_basic
-        for expression in expressions:
-            for variable in variables_in(expression):
-                uses.setdefault(variable.name, (variable.span, line))
-    for name, (span, line) in by_basic.items():
-        symbol = context.symbols.get(name)
-        if symbol is None or not symbol.latched or name not in by_blocks:
-            continue
-        block_span, block_line = by_blocks[name]
-        context.line = line
-        context.report(
-            "AMX4086",
-            f"{name} is used by BASIC in line {line} and by a block in line {block_line}",
-            span,
-            "blocks see the value latched at the start of the scan, BASIC the present one (3.3)",
-            (Note("the block is here", block_span),),
-        )
-
-
 AUTOMAX = Platform.AUTOMAX
 _TOO_LARGE, _TOO_MANY, _UTF_16 = "AMX0001", "AMX0002", "AMX0006"
 _NOT_READ = (_TOO_LARGE, _TOO_MANY, _UTF_16)
@@ -140,7 +105,7 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
     check_storage(context)
     check_reads(context, reads)
     check_flow(context, layout)
-    check_sharing(context, layout)
+    _check_sharing(context, layout)
     _check_expected_blocks(context, layout)
     _check_dynamic_blocks(context, layout)
     return layout
@@ -320,3 +285,36 @@ def _last(module: Module) -> Statement | None:
     while last is not None and any(bodies(last)):
         last = [body for body in bodies(last) if body][-1][-1]
     return last
+
+
+def _check_sharing(context: Context, layout: TaskLayout) -> None:
+    """Warn once for every latched common that blocks and BASIC statements of the scan both use.
+
+    Statements before SCAN_LOOP do not count: they run before the first latch, and the manual places them there.
+    """
+    by_blocks: dict[str, Use] = {}
+    by_basic: dict[str, Use] = {}
+    for statement, line, after in layout.numbered():
+        if not after:
+            continue
+        if isinstance(statement, Call):
+            expressions = tuple(argument.value for argument in arguments_of(statement))
+            uses = by_blocks
+        else:
+            expressions, uses = expressions_of(statement), by_basic
+        for expression in expressions:
+            for variable in variables_in(expression):
+                uses.setdefault(variable.name, (variable.span, line))
+    for name, (span, line) in by_basic.items():
+        symbol = context.symbols.get(name)
+        if symbol is None or not symbol.latched or name not in by_blocks:
+            continue
+        block_span, block_line = by_blocks[name]
+        context.line = line
+        context.report(
+            "AMX4086",
+            f"{name} is used by BASIC in line {line} and by a block in line {block_line}",
+            span,
+            "blocks see the value latched at the start of the scan, BASIC the present one (3.3)",
+            (Note("the block is here", block_span),),
+        )

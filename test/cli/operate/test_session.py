@@ -197,10 +197,9 @@ def test_a_prompt_goes_on_after_errors_and_ends_with_its_input(monkeypatch, caps
 
         def __exit__(self, *_: object) -> None: ...
 
-    monkeypatch.setattr("automax_ros.cli.operate.prompt.connected", Connected)
     lines = "get REF%\nfoo\nset 'REF%\npress REF%\n\n# a remark\nset REF%=7\nset NIL%=1\nquit\nset REF%=8\n"
     monkeypatch.setattr("sys.stdin", io.StringIO(lines))
-    code = run_shell(argparse.Namespace(rack="PM1", timeout=30 * 10**9))
+    code = run_shell(argparse.Namespace(rack="PM1", timeout=30 * 10**9), Connected)
     done_text = capsys.readouterr()
     assert (code, rack.values["REF%"]) == (1, "7")
     assert rack.waits_ns == {30 * 10**9}, "each line waits as long as the prompt"
