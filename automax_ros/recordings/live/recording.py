@@ -92,6 +92,7 @@ class LiveRecording(Recording):
         self._image: tuple[int, WriteHead, bytes] | None = None
         self._pending: list[tuple[str, int, bytes]] = []
         self._proven_ns = self._last_write = self._last_sent = 0
+        self._newest_write = (0, 0)
         self._open_gap: int | None = None
         self._last_values: dict[str, bytes] = {}
         self._values_now: dict[str, bytes] = {}
@@ -175,8 +176,9 @@ class LiveRecording(Recording):
 
     def _take_image(self, topic: str, sent_ns: int, payload: bytes) -> None:
         head = timely(image_head(payload))
-        if not self._check_run(head.run_id):
-            return
+        newest, newest_sent_ns = self._newest_write
+        if not self._check_run(head.run_id) or (head.sequence < newest and sent_ns <= newest_sent_ns):
+            return  # the writes that follow an older image were received already, or are lost
         if self._image is not None and head.sequence == self._image[1].sequence:
             self._begin()  # there was no write between the two images, so none is missing
         missing = self._log.missing(head.sequence, image=True)
@@ -196,6 +198,7 @@ class LiveRecording(Recording):
         head = timely(write_head(payload))
         if not self._check_run(head.run_id):
             return
+        self._newest_write = max(self._newest_write, (head.sequence, sent_ns))
         if not self._recording and self._image is not None:
             image = self._image[1].sequence
             if head.sequence == image + 1:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from replay.reexecution import Reexecution
 
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.messages.cdr.cdr import decode, encode
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.messages.types.rack_files import RackFile, files_of
@@ -299,6 +300,34 @@ def test_gap_in_the_write_log_is_told_and_rests_until_the_next_image(wire, tmp_p
     assert check_scans_saw_memory(bag) > 500
     (tmp_path / "again").mkdir()
     assert min(Reexecution(bag, tmp_path / "again").execute().scans.values()) > 200
+
+
+def test_an_image_from_before_a_loss_does_not_begin_the_recording_again(wire, tmp_path):
+    """A recorder that stood still gets the image of a late joiner after a write that shows the loss."""
+    wire.run(2.0)
+    older = len(wire.sent)
+    wire.stream.send_image()
+    wire.run(1.5)
+    after = len(wire.sent)
+    wire.run(0.5)
+    newer = wire.join()
+    wire.run(1.0)
+    sent = wire.end()
+    recording = recording_of(wire, tmp_path / "bag")
+    feed(recording, sent[:older])
+    first_write = next(number for number in range(after, newer) if sent[number].topic == "/line1/backplane")
+    feed(recording, sent[first_write : first_write + 1], after)
+    feed(recording, sent[older : older + 1], after)
+    later = 2 * NS_PER_S // SENT  # long enough without a write for what waits to be recorded
+    feed(recording, sent[first_write + 1 : newer], after + later)
+    feed(recording, sent[newer:], newer + later)
+    recording.close()
+    assert [gap.what for gap in recording.gaps] == ["writes of common memory"]
+    writes = [item.sequence for item in decoded(tmp_path / "bag", "/line1/backplane")]
+    ((before, following),) = [(one, two) for one, two in pairwise(writes) if two != one + 1]
+    assert recording.gaps[0].missing == following - before - 1
+    assert verdict_of(BagReader(tmp_path / "bag")).fault is None
+    assert check_scans_saw_memory(tmp_path / "bag") > 500
 
 
 def test_missing_scan_rests_its_task_alone(wire, tmp_path):
