@@ -1,0 +1,1 @@
+"""Block diagrams of tasks, drawn from the checked program."""
