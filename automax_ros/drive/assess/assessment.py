@@ -19,6 +19,7 @@ from automax_ros.drive.assess.drive_rules import (
     pmi_overcurrent,
     tach_loss,
 )
+from automax_ros.drive.assess.roll_rules import roll_findings
 from automax_ros.drive.current_loop.proposals import (
     BOUNDARY,
     LEAST_CONDUCTION,
@@ -161,4 +162,5 @@ def assess(case: DriveCase | Unjudged) -> DriveFindings:
     if isinstance(case, Unjudged):
         return DriveFindings(case.name, case.where, None, (Finding("plant", Rating.ATTENTION, case.reason, ""),))
     rules = LOOP_RULES if case.registers else PMI_RULES
-    return DriveFindings(case.name, case.where, case, tuple(rule(case) for rule in rules))
+    found = (*(rule(case) for rule in rules), *roll_findings(case))
+    return DriveFindings(case.name, case.where, case, found)

@@ -9,6 +9,7 @@ from math import pi
 
 from automax_ros.drive.assess.limits import DEFAULT_PERIOD_STEP_US, DEFAULT_PHASE_STEP_US, DEFAULT_THRESHOLD_DEG
 from automax_ros.drive.base.nameplate import DriveParameters
+from automax_ros.drive.web.data import Roll
 
 
 class Rating(enum.Enum):
@@ -56,6 +57,29 @@ class Computing:
 
 
 @dataclass(frozen=True)
+class RollCase:
+    """The roll of a drive, its web, and the scales of what its tasks read.
+
+    Attributes:
+        roll: the roll.
+        gear: turns of the motor per turn of the roll.
+        full_m: diameter of the full roll: what an unwinder begins with, or what a winder ends with.
+        stiffness_n: of its web, N; None without a web.
+        length_m: of its web.
+        counts_rpm: counts of the motor's speed per rpm; None where no feed of it has a scale.
+        counts_n: counts of the web's tension per N; None where no feed of it has a scale.
+    """
+
+    roll: Roll
+    gear: float
+    full_m: float
+    stiffness_n: float | None = None
+    length_m: float = 1.0
+    counts_rpm: float | None = None
+    counts_n: float | None = None
+
+
+@dataclass(frozen=True)
 class DriveCase:
     """The known data of a drive.
 
@@ -74,6 +98,7 @@ class DriveCase:
         voltage: whether the armature voltage is wired to a 57C405.
         registers: whether it is driven by a 57C406, with registers and a loop in a task.
         computing: how long the scans of that task compute, None without one.
+        roll: the roll that the motor turns, None without one.
     """
 
     name: str
@@ -90,6 +115,7 @@ class DriveCase:
     voltage: bool = False
     registers: bool = True
     computing: Computing | None = None
+    roll: RollCase | None = None
 
     @property
     def armature_v(self) -> float:

@@ -169,6 +169,8 @@ class Motor(Machine):
     mechanics use the exact charge of the interval. The error of the prediction in volt-seconds is corrected in the next
     interval, so that errors do not add up: below 0.01 % of speed in a start at full voltage
     (``test/drive/circuit/test_energy``).
+
+    Couplings and webs set their torques on the shaft, N m; that of webs, ``web_n_m``, is in their own state.
     """
 
     _kept = (
@@ -213,6 +215,7 @@ class Motor(Machine):
         self.step_ns = LONGEST_NS
         self._emf = self._owed_v_s = self._smooth = 0.0
         self.coupling_n_m = 0.0
+        self.web_n_m = 0.0
         self.torque_n_m = 0.0
         self.shaft_j = self.friction_j = self.load_j = 0.0
 
@@ -296,7 +299,7 @@ class Motor(Machine):
     def _turn(self, time_s: float, torque: float, load: float) -> None:
         """Apply constant torques (N m) for a time; trapezoidal in speed, so that the energies add up exactly."""
         data, speed = self.data, self.speed_rad_s
-        drive = torque - load + self.coupling_n_m
+        drive = torque - load + self.coupling_n_m + self.web_n_m
         rubbing = data.coulomb_n_m
         if rubbing:
             if speed == 0.0:
@@ -320,7 +323,7 @@ class Motor(Machine):
         """Apply a torque (N m) for a time to a held shaft: its holder absorbs what friction leaves."""
         data, speed = self.data, self.speed_rad_s
         rubbing = data.coulomb_n_m * ((speed > 0.0) - (speed < 0.0))
-        left = torque + self.coupling_n_m - rubbing - data.viscous_n_m_s * speed
+        left = torque + self.coupling_n_m + self.web_n_m - rubbing - data.viscous_n_m_s * speed
         self._move(time_s, speed, torque, left, rubbing)
 
     def _move(self, time_s: float, mean_speed: float, torque: float, load: float, rubbing: float) -> None:

@@ -60,6 +60,7 @@ class Coupling(Stateful):
         self.twist_rad = self.torque_n_m = 0.0
         self._ratio = require("ratio of the coupling", ratio, LEAST_RATIO, MOST_RATIO)
         self._stiffness = stiffness_n_m_rad
+        self._inertias = one.inertia_kg_m2, two.inertia_kg_m2
         self._damping = require("damping of the coupling in N m s/rad", damping_n_m_s, 0.0)
         self.slice_ns = LONGEST_SLICE_NS
         if stiffness_n_m_rad is None:
@@ -81,6 +82,23 @@ class Coupling(Stateful):
         speed = self._share * one.speed_rad_s + (1 - self._share) * two.speed_rad_s * ratio
         one.speed_rad_s, two.speed_rad_s = speed, speed / ratio
         one.inertia_kg_m2, two.inertia_kg_m2 = whole, whole * ratio**2
+
+    def carry(self, first_kg_m2: float, second_kg_m2: float) -> None:
+        """Set what the loads add to the inertias of the motors at present, kg m2: rolls of web change."""
+        one, two, ratio = self._one, self._two, self._ratio
+        first, second = self._inertias[0] + first_kg_m2, self._inertias[1] + second_kg_m2
+        if self._stiffness is None:
+            whole = first + second / ratio**2
+            self._share = first / whole
+            first, second = whole, whole * ratio**2
+        one.inertia_kg_m2, two.inertia_kg_m2 = first, second
+
+    def turn_at(self, speed_rad_s: float, *, first: bool) -> None:
+        """Set the speed of one motor (rad/s), and of the other where the shaft is stiff."""
+        if first or self._stiffness is None:
+            self._one.speed_rad_s = speed_rad_s if first else speed_rad_s * self._ratio
+        if not first or self._stiffness is None:
+            self._two.speed_rad_s = speed_rad_s / self._ratio if first else speed_rad_s
 
     def advance(self, until_ns: int) -> None:
         """Advance both circuits to an instant, ns."""
@@ -162,7 +180,7 @@ class CouplingData:
 
 
 class CoupledPlants:
-    """Two plants that advance together, with the ``coupling`` between them."""
+    """Two plants, ``first`` and ``second``, that advance together, with the ``coupling`` between them."""
 
     def __init__(self, first: DrivePlant, second: DrivePlant, data: CouplingData) -> None:
         """Couple two plants at their start.
@@ -171,7 +189,7 @@ class CoupledPlants:
             ParameterError: a value is outside its range, the coupling would swing faster than the model follows, or a
                 held shaft would be coupled stiffly.
         """
-        self._first, self._second = first, second
+        self.first, self.second = first, second
         self.coupling = Coupling(
             first.circuit,
             second.circuit,
@@ -184,7 +202,7 @@ class CoupledPlants:
 
     def advance(self, until_ns: int) -> None:
         """Advance both to an instant, ns."""
-        first, second, coupling = self._first, self._second, self.coupling
+        first, second, coupling = self.first, self.second, self.coupling
         while True:
             due_ns = min(first.contacts_ns, second.contacts_ns, until_ns)
             coupling.advance(int(due_ns))

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import radians
+from typing import Protocol
 
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.values import number
@@ -266,18 +267,33 @@ LINE_VERBS: Mapping[str, PlantVerb] = {
 """The verbs on a plant's line, by name."""
 
 
-def values_of(verb: str, text: str) -> Numbers:
-    """Return the numbers that a verb reads from a text.
+class Readable(Protocol):
+    """What reads its values from a text; ``wants`` describes them, "" for none."""
+
+    @property
+    def wants(self) -> str: ...  # noqa: D102
+    @property
+    def read(self) -> Callable[[str], Numbers]: ...  # noqa: D102
+
+
+def values_of(verb: str, text: str, verbs: Mapping[str, Readable] | None = None, owner: str = "a plant") -> Numbers:
+    """Return the numbers that a verb of ``owner`` reads from a text; ``verbs`` are its verbs, ``VERBS`` if None.
 
     Raises:
         ParameterError: there is no such verb, or the text is not valid for it.
     """
-    if verb not in VERBS:
-        raise ParameterError(f"a plant has no {quoted(verb)}: {near_or_listed(verb, VERBS)}")
+    known: Mapping[str, Readable] = VERBS if verbs is None else verbs
+    if verb not in known:
+        raise ParameterError(f"{owner} has no {quoted(verb)}: {near_or_listed(verb, known)}")
     try:
-        return VERBS[verb].read(text)
+        return known[verb].read(text)
     except ValueError as error:
-        raise ParameterError(f"{verb} cannot be {quoted(text)}: it takes {VERBS[verb].wants}") from error
+        raise ParameterError(f"{verb} cannot be {quoted(text)}: it takes {takes(known[verb])}") from error
+
+
+def takes(verb: Readable) -> str:
+    """Return what a verb takes, in words."""
+    return verb.wants or "no value"
 
 
 def execute_verb(plant: DrivePlant, verb: str, values: Numbers) -> None:

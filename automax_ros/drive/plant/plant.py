@@ -217,7 +217,11 @@ class DrivePlant(Stateful):
         """Advance to an instant, ns, coupled plants too; an instant in the past counts as the present."""
         if self._together is not None:
             self._together(until_ns)
-            return
+        else:
+            self.advance_alone(until_ns)
+
+    def advance_alone(self, until_ns: int) -> None:
+        """Advance to an instant, ns, without what it goes together with: for that alone."""
         circuit = self.circuit
         while self._contacts and self._contacts[0][0] <= until_ns:
             circuit.advance(max(self._contacts[0][0], circuit.now_ns))
@@ -226,7 +230,7 @@ class DrivePlant(Stateful):
             circuit.advance(until_ns)
 
     def go_together(self, advance: Callable[[int], None]) -> None:
-        """Set the function that advances this plant together with another; see ``plant/coupling``."""
+        """Set the function that advances this plant together with others; see ``plant/coupling`` and ``web/chain``."""
         self._together = advance
 
     @property

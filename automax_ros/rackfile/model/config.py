@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from automax_ros.core.names import Element, element
 from automax_ros.core.types import DataType, Value
 from automax_ros.rackfile.model.module import ModuleConfig, Registers, TaskConfig
 from automax_ros.rackfile.model.plants import FeedConfig, JointCommand, PlantConfig
+from automax_ros.rackfile.model.webs import WebConfig
 from automax_ros.rackfile.reading.executive import NEWEST
 from automax_ros.rackfile.reading.scale import Scale
 
@@ -118,9 +119,10 @@ class RackConfig:
     ``namespace`` is its ROS namespace without the slash, ``path`` the YAML file and ``text`` its content. Modules are
     in the order of slots, variables in the order of the file; after them come the registers of the modules that have
     some, each as one variable with a ``bank``. ``executive`` is the version of the Programming Executive in tenths (42
-    is 4.2), ``auto_run`` whether the tasks that ran are put into RUN after a power cycle. ``plants`` are in the order
-    of the file, ``feeds`` and ``joint_commands`` in that of their plants. ``watch`` are the commons to show, None if
-    the file has no such key.
+    is 4.2), ``auto_run`` whether the tasks that ran are put into RUN after a power cycle. ``plants`` and ``webs``
+    are in the order of the file, ``feeds`` and ``joint_commands`` in that of their plants and webs. ``watch`` are the
+    commons to show, None if the file has no such key, ``alarms`` the booleans that are alarms. ``meant_so`` are
+    commons, plants and slots that are as they are on purpose, each with the line of the file that says so.
     """
 
     name: str
@@ -135,9 +137,12 @@ class RackConfig:
     auto_run: bool = False
     on_module_loss: ModuleLoss = ModuleLoss.STOP_ALL
     plants: tuple[PlantConfig, ...] = ()
+    webs: tuple[WebConfig, ...] = ()
     feeds: tuple[FeedConfig, ...] = ()
     joint_commands: tuple[JointCommand, ...] = ()
     watch: tuple[CommonElement, ...] | None = None
+    alarms: tuple[CommonElement, ...] = ()
+    meant_so: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
     def by_name(self) -> Mapping[str, CommonVariable]:

@@ -14,6 +14,7 @@ from automax_ros.drive.base.nameplate import EXAMPLES, NamePlate, derive
 from automax_ros.drive.plant.coupling import CoupledPlants, CouplingData
 from automax_ros.drive.plant.overspeed import FULL
 from automax_ros.drive.plant.plant import DrivePlant, LoadData, PlantData
+from automax_ros.drive.web.data import SurfaceData
 from automax_ros.rackfile.reading.scale import Scale
 
 PLANT_NAME = r"[A-Z][A-Z0-9_]{0,15}"
@@ -73,7 +74,7 @@ class PlantConfig:
     ``motor`` is a name of ``MOTORS`` or a plate; None for a plant of which only the drive's parameters are known, which
     is not simulated. ``motor_overload_ratio`` is in %, ``inertia`` that of motor and load over the motor's own.
     ``couple`` is None for no coupling, or if the section of the other plant has it; ``joint`` the name of its shaft on
-    ROS, "" if that is the plant's name.
+    ROS, "" if that is the plant's name; ``surface`` the roll or roller that its motor turns, None without one.
     """
 
     name: str
@@ -85,6 +86,7 @@ class PlantConfig:
     inertia: float = 1.0
     couple: CoupleConfig | None = None
     joint: str = ""
+    surface: SurfaceData | None = None
 
     @property
     def joint_name(self) -> str:
@@ -122,9 +124,11 @@ class JointCommand:
 
 @dataclass(frozen=True)
 class FeedConfig:
-    """A signal of a plant (``drive/plant/signals.SIGNALS``) that an instrument brings into an element of a common.
+    """A signal that an instrument brings into an element of a common.
 
-    ``scale`` converts the signal to the counts of an INTEGER; None for a REAL, which has the signal itself.
+    It is one of a plant (``SIGNALS`` of ``drive/plant/signals``), of its roll or roller (``END_SIGNALS`` of
+    ``drive/web/signals``), or of a web (``WEB_SIGNALS`` there), whose name ``plant`` then is. ``scale`` converts the
+    signal to the counts of an INTEGER; None for a REAL, which has the signal itself, and for a BOOLEAN.
     """
 
     plant: str
@@ -134,6 +138,12 @@ class FeedConfig:
     every_ns: int
     scale: Scale | None = None
     line: int = 0
+    is_of_web: bool = False
+
+    @property
+    def owner(self) -> str:
+        """What it shows, in words."""
+        return f"{'web' if self.is_of_web else 'plant'} {self.plant}"
 
 
 def full_speeds(feeds: Iterable[FeedConfig]) -> dict[str, float]:

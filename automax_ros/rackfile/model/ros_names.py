@@ -8,7 +8,7 @@ never make two names equal:
 - the topic of a variable is its name without the type character: ``common/LINE_SPEED``;
 - commons that differ only in type get the type's word: ``common/SPEED_int`` and ``common/SPEED_bool``;
 - the topic of a plant is its name: ``plants/UNWIND``; the topic that commands its joint is a controller's:
-  ``UNWIND_velocity_controller/commands``;
+  ``UNWIND_velocity_controller/commands``; that of its roll or roller is ``rolls/UNWIND``, that of a web ``webs/W1``;
 - the topic of a network of racks is ``/dcsnet/PAPER``, next to their namespaces and in none of them (decision);
 - a name that begins with an underscore gets ``u`` in front, since ROS tools hide such topics: ``common/u_SPARE``
   (decision). Repeated underscores, which the ROS design page advises against and ROS accepts, stay as they are.
@@ -64,6 +64,26 @@ JOINTS = "joint_states"
 def plant_topic(name: str) -> str:
     """Return the topic of a plant's state, relative to the rack's namespace."""
     return f"plants/{name}"
+
+
+def roll_topic(plant: str) -> str:
+    """Return the topic of the roll or roller of a plant, relative to the rack's namespace."""
+    return f"rolls/{plant}"
+
+
+def web_topic(web: str) -> str:
+    """Return the topic of a web's state, relative to the rack's namespace."""
+    return f"webs/{web}"
+
+
+def tension_topic(topic: str) -> str:
+    """Return the topic of a web's tension alone, next to that of its state."""
+    return f"{topic}/tension"
+
+
+def roll_joint(joint: str) -> str:
+    """Return the name of the joint of a roll or roller by that of its motor's shaft."""
+    return f"{joint}_roll"
 
 
 def load_topic(name: str) -> str:

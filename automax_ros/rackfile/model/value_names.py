@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from automax_ros.core.kinds import Direction
 from automax_ros.core.names import PREDEFINED, Element, NameFault
 from automax_ros.core.names import setting as named_setting
+from automax_ros.core.text import quoted
 from automax_ros.core.types import DataType, Value, bare_name
+from automax_ros.core.user_error import UserError
+from automax_ros.core.values import value_of, value_text
 from automax_ros.language.program import Program, Symbol, lines_that_write
 from automax_ros.rackfile.model.config import NO_SUCH_COMMON, CommonElement, RackConfig
 
@@ -71,13 +74,18 @@ def tuning(programs: Mapping[str, Program], text: str) -> TunableSetting:
     """Return the tunable and value of ``TASK.NAME=VALUE``; the type character may be left out.
 
     Raises:
-        UserError: the task has none of that name, or the value is not of its type.
+        UserError: not of that form, the task has none of that name, or the value is not of its type.
         KeyError: there is no such task.
     """
-    owner, _, value = text.partition("=")
+    owner, equals, value = text.partition("=")
     task, _, name = owner.strip().upper().partition(".")
     tunables = tunables_of(programs[task])
     bare = {bare_name(full): full for full in tunables}
     full = name if name in tunables else bare.get(name, name)
+    symbol = tunables.get(full)
+    if symbol is not None and symbol.tuning is not None and value_of(value.strip(), symbol.type) is None:
+        limits = f"it takes {value_text(symbol.tuning.low)} to {value_text(symbol.tuning.high)}"
+        given = f"{quoted(value.strip())} is not a value for {full}, type {symbol.type.word}"
+        raise UserError(given if equals else f"{quoted(text)} is not TASK.NAME=VALUE", limits)
     meant, found = named_setting(f"{full}={value}", tunables, f"task {task} has no tunable")
     return TunableSetting(task, meant.label, found)

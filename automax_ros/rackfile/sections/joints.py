@@ -21,6 +21,7 @@ from automax_ros.core.types import DataType
 from automax_ros.core.yaml_text import Node
 from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.rackfile.model.plants import JointCommand
+from automax_ros.rackfile.model.ros_names import roll_joint
 from automax_ros.rackfile.reading.scale import SCHEMA as SCALE
 from automax_ros.rackfile.reading.scale import Scale, scale_of
 from automax_ros.rackfile.reading.values import Key, ProblemList, Section, schemas, text_key, text_value
@@ -80,14 +81,24 @@ def read_joint(node: Node, plant: str, findings: ProblemList) -> GivenJoint:
     return GivenJoint(plant, name, tuple((interface, node) for interface, node in commands if node is not None))
 
 
-def check_joint_names(names: Mapping[str, tuple[str, Span]], findings: ProblemList) -> None:
-    """Report joints with the same name; ``names`` are those of the plants, with the place of each plant."""
+def check_joint_names(
+    names: Mapping[str, tuple[str, Span]], findings: ProblemList, with_rolls: Iterable[str] = ()
+) -> None:
+    """Report joints with the same name; ``names`` are those of the plants, with the place of each plant.
+
+    The plants of ``with_rolls`` have a second joint, that of their roll or roller.
+    """
     seen: dict[str, str] = {}
     for plant, (name, span) in names.items():
         if name in seen:
             message = f"the joint of plant {plant} is called {name}, and so is that of plant {seen[name]}"
             findings.add(CODE, message, span, "joint_states knows a joint by its name only")
         seen.setdefault(name, plant)
+    for plant in with_rolls:
+        name = roll_joint(names[plant][0])
+        if name in seen:
+            message = f"the joint of plant {seen[name]} is called {name}, and so is that of the roll of plant {plant}"
+            findings.add(CODE, message, names[seen[name]][1], "joint_states knows a joint by its name only")
 
 
 def read_commands(

@@ -36,6 +36,7 @@ from automax_ros.rackfile.reading.values import (
 )
 from automax_ros.rackfile.sections.couples import SCHEMA as COUPLE_SCHEMA
 from automax_ros.rackfile.sections.couples import check_couples, read_couple
+from automax_ros.rackfile.sections.feeds import PLANT_SIGNAL, SURFACE_SIGNAL, GivenFeeds
 from automax_ros.rackfile.sections.feeds import SCHEMA as FEED_SCHEMA
 from automax_ros.rackfile.sections.joints import SCHEMA as JOINT_SCHEMA
 from automax_ros.rackfile.sections.joints import GivenJoint, check_joint_names, read_joint
@@ -47,6 +48,8 @@ from automax_ros.rackfile.sections.plant_keys import (
     read_load,
     read_supply,
 )
+from automax_ros.rackfile.sections.surfaces import KEYS as SURFACE_KEYS
+from automax_ros.rackfile.sections.surfaces import read_surface
 
 MOST_PLANTS = 32
 """Most plants of a rack (decision: two for each of 16 slots)."""
@@ -70,6 +73,7 @@ _SIMULATED: Keys = {
     "load": LOAD_SCHEMA,
     **schemas(INERTIA),
     "couple": COUPLE_SCHEMA,
+    **SURFACE_KEYS,
     "feeds": FEED_SCHEMA,
     "joint": JOINT_SCHEMA,
 }
@@ -102,7 +106,7 @@ class Plants:
     findings: ProblemList
     known: dict[str, PlantConfig] = field(default_factory=dict)
     complete: bool = True
-    feeds: list[tuple[str, Node]] = field(default_factory=list)
+    feeds: list[GivenFeeds] = field(default_factory=list)
     joints: list[GivenJoint] = field(default_factory=list)
     _claimed: dict[str, tuple[str, Span]] = field(default_factory=dict)
 
@@ -151,7 +155,9 @@ def read_plants(node: Node | None, findings: ProblemList) -> Plants:
             plants.known[name] = _plant(name, key, value, plants)
     if plants.complete:
         check_couples(plants.known, findings)
-        check_joint_names({name: (plant.joint_name, places[name]) for name, plant in plants.known.items()}, findings)
+        rolls = [name for name, plant in plants.known.items() if plant.surface is not None]
+        names = {name: (plant.joint_name, places[name]) for name, plant in plants.known.items()}
+        check_joint_names(names, findings, rolls)
     return plants
 
 
@@ -165,7 +171,8 @@ def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
     if motor is None and needless:
         findings.add("AMX6009", f"{what} has {needless} and no motor: it is not simulated", section.key_span(needless))
     if feeds is not None:
-        plants.feeds.append((name, feeds))
+        has_surface = "roll" in section or "roller" in section
+        plants.feeds.append(GivenFeeds(name, feeds, SURFACE_SIGNAL if has_surface else PLANT_SIGNAL))
     if joint is not None:
         plants.joints.append(read_joint(joint, name, findings))
     config = PlantConfig(
@@ -178,6 +185,7 @@ def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
         section.read(INERTIA) or 1.0,
         read_couple(couple, what, findings) if couple else None,
         plants.joints[-1].name if joint else "",
+        read_surface(section, what, findings),
     )
     if not findings.errors:
         try:

@@ -1,0 +1,1 @@
+"""Tests of webs, rolls, rollers and dancers."""
