@@ -1,8 +1,13 @@
-"""Make a rack file (.yaml) from the configuration task (.CNF) of a rack of Executive 2.1 or earlier.
+"""Make a rack file (.yaml) from a plant's disks: the folder of an Executive 3.x or 4.x, or a configuration task (.CNF).
 
-IODEF, MEMDEF, NVMEMDEF, RIODEF, NETDEF, GBLDEF, RNETDEF, ABDEF, MODDEF and TASK are read; other lines are reported with
-their numbers, and the exit code is 1. No line of the old configuration says which module stands in a slot of I/O
-points: --module says it, otherwise they become plain common variables and the rack file proposes modules.
+FOLDER is a rack's folder, its system's, or the whole library, as copied from the disk: its databases ($CARD.DBF and so
+on) are read, and the tasks are converted and written next to the rack file. What is guessed, damaged or left out is
+told; --headers shows first what the databases hold, without names of the plant.
+
+RACK.CNF is the configuration task of Executive 2.1 or earlier: IODEF, MEMDEF, NVMEMDEF, RIODEF, NETDEF, GBLDEF,
+RNETDEF, ABDEF, MODDEF and TASK are read; other lines are reported with their numbers, and the exit code is 1. No line
+of it says which module stands in a slot of I/O points: --module says it, otherwise they become plain common variables
+and the rack file proposes modules.
 """
 
 from __future__ import annotations
@@ -15,6 +20,7 @@ from pathlib import Path
 from automax_ros.cli.options.values import add_output_argument
 from automax_ros.cli.output.files import write_whole
 from automax_ros.cli.output.screen import print_diagnostics
+from automax_ros.cli.racks.import_folder import add_folder_arguments, import_folder, refuse_folder_options
 from automax_ros.cli.racks.new import require_free
 from automax_ros.core.diagnostics import SourceText, has_errors
 from automax_ros.core.text import count_of, quoted
@@ -32,7 +38,7 @@ _MODULE = re.compile(r"([0-9]{1,2})=(.{1,20})")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax import``."""
-    parser.add_argument("file", type=Path, metavar="RACK.CNF", help="the configuration task")
+    parser.add_argument("file", type=Path, metavar="FOLDER|RACK.CNF", help="a disk's folder, or a configuration task")
     add_output_argument(parser, "RACK.yaml", "where to write (default: the standard output)")
     parser.add_argument(
         "--module",
@@ -40,14 +46,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="SLOT=NUMBER",
         dest="modules",
-        help="the module in a slot of I/O points, such as 5=57C419; may be given again",
+        help="the module in a slot, such as 5=57C419; may be given again",
     )
-    parser.add_argument("--force", action="store_true", help="write over a rack file that is there")
+    parser.add_argument("--force", action="store_true", help="write over a rack file, and tasks, that are there")
+    add_folder_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the rack file; 1 where lines could not be read, or `automax check` would find errors in it."""
     modules = dict(_module(text) for text in arguments.modules)
+    if arguments.file.is_dir():
+        return import_folder(arguments, modules)
+    refuse_folder_options(arguments)
     if arguments.output is not None:
         require_free(arguments.output, force=arguments.force)
     source = _source(arguments.file)
@@ -78,7 +88,7 @@ def _module(text: str) -> tuple[int, str]:
 
 def _source(path: Path) -> SourceText:
     if path.suffix.upper() != ".CNF":
-        raise UsageError(f"{path} is not a configuration task, which is a .CNF file")
+        raise UsageError(f"{path} is not a configuration task, which is a .CNF file, nor the folder of a disk")
     try:
         return read_task_source(path)
     except FileFault as fault:

@@ -331,7 +331,7 @@ def _flag(given: _Given) -> bool:
     return given.value is None or _one_of(given, ("TRUE", "FALSE")) == "TRUE"
 
 
-_WHY_ELSEWHERE = {"GBLDEF": "where it stands is in the network's .NET file, which is not read"}
+_WHY_ELSEWHERE = {"GBLDEF": "where it stands is in the network's .NET file, whose form is not known"}
 _Read = Callable[[_Reader, Token, _Tokens], None]
 _STATEMENTS: dict[str, _Read] = {
     "IODEF": _Reader._io,

@@ -3,9 +3,9 @@
 Every COMMON that a task declares becomes a common variable of the rack. The tasks share the Processors evenly; the one
 that scans most often is served first (decision).
 
-A task belongs to a UDC if it calls a block that runs only there (table 5). Two tasks of equal TICKS share a UDC. A task
-does not give the places of its commons in the dual port: they get application registers in turn (decision), which the
-plant's drawings replace.
+A task belongs to a UDC if it calls a block that runs only there (table 5), or if the user says so. Two tasks of equal
+TICKS share a UDC. A task does not give the places of its commons in the dual port: they get application registers in
+turn (decision), which the plant's drawings replace.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.compile.base.cost import Model
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.text import quoted
+from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_MS, UDC_TICK_NS
 from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataType, declaration_text
 from automax_ros.core.user_error import UserError
@@ -272,13 +272,15 @@ def _file_key(task: DraftedTask) -> str:
     return "" if task.file == f"{task.name}.BLK" else f"file: {quoted_file}, "
 
 
-def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
+def draft(folder: Path, rack_folder: Path, tick_ns: int, udc: frozenset[str] = frozenset()) -> Draft:
     """Collect the tasks and commons of a folder for a rack file in ``rack_folder``, which is the folder or above it.
 
-    A file that cannot be a task is left out, a task with errors is used as far as it can be read.
+    A file that cannot be a task is left out, a task with errors is used as far as it can be read. ``udc`` names tasks
+    that run on a UDC although no block of theirs says so.
 
     Raises:
-        DraftFault: the folder cannot be read, holds no task, or is not below ``rack_folder``.
+        DraftFault: the folder cannot be read, holds no task, or is not below ``rack_folder``, or ``udc`` names a task
+            that is not there.
     """
     try:
         inner = folder.resolve().relative_to(rack_folder.resolve())
@@ -287,10 +289,12 @@ def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
         raise DraftFault(message, f"put the rack file into {folder}") from None
     found = Draft(rack_name(folder.resolve().name), tick_ns)
     for path in _sources(folder):
-        _take(found, path, folder, inner)
+        _take(found, path, folder, inner, udc)
     if not found.tasks:
         reasons = "".join(f"; {quoted(name)} {reason}" for name, reason in found.left_out[:3])
         raise DraftFault(f"{folder} holds no task (.BLK, .BAS){reasons}")
+    for name in sorted(udc.difference(_names(found))):
+        raise DraftFault(f"{folder} holds no task {quoted(name)} for a UDC", did_you_mean(name, _names(found)))
     for task in found.tasks:
         tick, model = (UDC_TICK_NS, Model.UDC) if task.on_udc else (tick_ns, Model.NONE)
         found.results[task.name] = check_source(task.source, task.name, tick, found.commons, model)
@@ -307,7 +311,11 @@ def _sources(folder: Path) -> list[Path]:
     return sorted(path for path in entries if is_task_file(path))
 
 
-def _take(found: Draft, path: Path, folder: Path, inner: Path) -> None:
+def _names(found: Draft) -> list[str]:
+    return [task.name for task in found.tasks]
+
+
+def _take(found: Draft, path: Path, folder: Path, inner: Path, udc: frozenset[str]) -> None:
     if not path.name.isprintable():
         found.left_out.append((path.name, "has a name that no rack file can hold: rename it"))
         return
@@ -321,7 +329,7 @@ def _take(found: Draft, path: Path, folder: Path, inner: Path) -> None:
         return
     module, _ = parse(source)
     name = _task_name(path.stem, {task.name for task in found.tasks})
-    task = DraftedTask(name, str(inner / path.name), source, is_udc_task(module))
+    task = DraftedTask(name, str(inner / path.name), source, is_udc_task(module) or name in udc)
     found.tasks.append(task)
     for statement, *_ in statements_in_order(module.statements):
         if isinstance(statement, Declaration) and statement.scope is Scope.COMMON:

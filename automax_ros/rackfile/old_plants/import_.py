@@ -12,6 +12,7 @@ from automax_ros.rackfile.model.module import MAX_TASKS
 from automax_ros.rackfile.modules.registry import KINDS
 from automax_ros.rackfile.old_plants.configuration_task import Configuration, DefinedCommon, DefinedTask
 from automax_ros.rackfile.old_plants.draft import commented, rack_name
+from automax_ros.rackfile.old_plants.net_files import net_lines, quoted_for
 
 _PROCESSOR = "57C430A"
 """Replaces the 57C430 of a rack with a configuration task, which does not run this software (decision)."""
@@ -20,6 +21,8 @@ _EXECUTIVE = "2.1"
 _MEMORY = "57C413"
 _NETWORK = "57C404"
 """The module of NETDEF."""
+_IN_MEMORY = ("MEMDEF", "NVMEMDEF")
+"""The statements whose variables are in common memory."""
 
 
 @dataclass
@@ -37,7 +40,8 @@ def rack_file_of(
 
     ``title`` gives the rack's name; task sources lie in ``folder`` and end in one of ``suffixes``, such as ``.BLK``.
     ``modules`` are the modules in slots of I/O points. Points in other slots become plain commons, since their module
-    is not known: a comment has their place, and the modules that have such registers (decision).
+    is not known: a comment has their place, and the modules that have such registers (decision). Lines of .NET files in
+    the folder that name a variable without a place are quoted next to it.
     """
     return _Importing(configuration, folder, modules, suffixes).result(title)
 
@@ -49,8 +53,10 @@ class _Importing:
     modules: Mapping[int, str]
     suffixes: Sequence[str]
     diagnostics: list[Diagnostic] = field(default_factory=list)
+    _net_lines: Mapping[str, str] = field(default_factory=dict)
 
     def result(self, title: str) -> Imported:
+        self._net_lines = net_lines(self.folder)
         lines = [
             "# Made from a configuration task; docs/rack_yaml.md has every key.",
             f"rack: {rack_name(title)}",
@@ -127,7 +133,8 @@ class _Importing:
         text = declaration_text(declared.name, declared.dimensions, declared.length)
         if point is None:
             options = "{non_volatile: true}" if common.non_volatile else "{}"
-            return commented(f"  {text}: {options}", f"{common.keyword}, line {common.line}")
+            line = quoted_for(declared.name, self._net_lines) if common.keyword not in _IN_MEMORY else ""
+            return commented(f"  {text}: {options}", f"{common.keyword}, line {common.line}{line}")
         place = f"slot: {point.slot}, " + ("" if common.drop is None else f"drop: {common.drop}, ")
         place += f"register: {point.register}"
         place += "" if point.bit is None else f", bit: {point.bit}"

@@ -1,6 +1,7 @@
 """Makes task sources of an old plant acceptable: replaces remnants of DOS editors and older Executives, in place.
 
-Line numbers stay, and so does the number of lines. Text that is not understood is not changed.
+Line numbers stay, and so does the number of lines, but for include files, which are written into the task. Text that is
+not understood is not changed.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from automax_ros.language.text.constants import STRING_LIMIT
 from automax_ros.language.text.lexer import END_OF_FILE, LineReader
 from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
 from automax_ros.language.text.tokens import Token, TokenKind
+from automax_ros.rackfile.old_plants.includes import Included, ReadInclude, with_includes
 
 Check = Callable[[str], Iterable[Diagnostic]]
 """Returns the diagnostics of a task's text."""
@@ -39,13 +41,15 @@ _Cure = Callable[[str, str], str | None]
 class Converted:
     """A source before and after its conversion: texts, and ``data``, the bytes to store; ``notes`` list the changes.
 
-    Lines of ``before`` end like those of ``after``, so that the two can be compared line by line.
+    Lines of ``before`` end like those of ``after``, so that the two can be compared line by line. ``refused`` says
+    which include files are not in it, and why.
     """
 
     before: str
     after: str
     data: bytes
     notes: tuple[str, ...]
+    refused: tuple[str, ...] = ()
 
     @property
     def changed(self) -> bool:
@@ -53,8 +57,8 @@ class Converted:
         return bool(self.notes)
 
 
-def convert(data: bytes, check: Check) -> Converted:
-    """Return a source made acceptable; ``check`` finds what is left to change.
+def convert(data: bytes, check: Check, read_include: ReadInclude | None = None) -> Converted:
+    """Return a source made acceptable; ``check`` finds what is left to change, ``read_include`` reads include files.
 
     UTF-16 becomes UTF-8; a byte order mark, and Ctrl-Z with all that follows, where DOS stops reading, are left out; CR
     LF and CR become LF. Control characters become blanks. Outside of texts between quotes tabs become blanks up to the
@@ -72,14 +76,24 @@ def convert(data: bytes, check: Check) -> Converted:
     if ends:
         notes.append(f"{count_of(ends, 'line end')} written as LF")
     counts: Counter[str] = Counter()
-    after = before
+    included = Included(before) if read_include is None else with_includes(before, read_include)
+    notes += [f"{name} written in place of its INCLUDE" for name in included.files]
+    after = included.text
     for _ in range(_MOST_ROUNDS):
         changed = _with_constants(_in_upper_case(_without_control(after, counts), counts), check, counts)
         if changed == after:
             break
         after = changed
     notes += [count_of(number, thing) for thing, number in counts.items()]
-    return Converted(before, after, after.encode(encoding), tuple(notes))
+    return Converted(before, after, _encoded(after, encoding), tuple(notes), tuple(included.refused))
+
+
+def _encoded(text: str, encoding: str) -> bytes:
+    """Return a text as bytes; in UTF-8 where an include file has letters that its own encoding lacks."""
+    try:
+        return text.encode(encoding)
+    except UnicodeEncodeError:
+        return text.encode()
 
 
 def _decode(data: bytes) -> tuple[str, str, list[str]]:
