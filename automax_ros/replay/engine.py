@@ -158,9 +158,21 @@ class Replay:
         """Return the log time of the state with which each task begins, empty if the range begins with the run."""
         return _last_states(reader, self.facts.table.stamp + options.from_ns) if options.from_ns else {}
 
-    def begin(self, starts: Mapping[str, int], options: ReplayOptions, watcher: Watcher | None = None) -> Run:
-        """Return a new pass over the recording, or over files of it."""
-        return Run(self.bag, self.rack, self.facts, self.sources, options, starts, watcher, self._forms)
+    def begin(
+        self,
+        starts: Mapping[str, int],
+        options: ReplayOptions,
+        watcher: Watcher | None = None,
+        *,
+        only: str | None = None,
+        kind: type[TaskReplay] = TaskReplay,
+    ) -> Run:
+        """Return a new pass over the recording, or over files of it; of task ``only`` alone, if it is given.
+
+        ``kind`` is the class that executes the scans of a task.
+        """
+        sources = [source for source in self.sources if only in (None, source.name)]
+        return Run(self.bag, self.rack, self.facts, sources, options, starts, watcher, self._forms, kind)
 
     def report(self, totals: Totals, options: ReplayOptions) -> ReplayReport:
         """Return the report of totals.
@@ -218,6 +230,7 @@ class Run:
         starts: Mapping[str, int],
         watcher: Watcher | None,
         forms: ColumnForms,
+        kind: type[TaskReplay] = TaskReplay,
     ) -> None:
         self._bag, self._rack, self._sources, self._options = bag, rack, sources, options
         self._watcher, self._forms = watcher, forms
@@ -235,9 +248,7 @@ class Run:
         writers = {writer.name: writer.id for writer in facts.table.writers if writer.kind == WriterKind.TASK}
         for source in sources:
             starts_at = starts.get(source.name)
-            task = TaskReplay(
-                bag, source, self._commons, self._tallies, tolerance=options.tolerance, starts_at=starts_at
-            )
+            task = kind(bag, source, self._commons, self._tallies, tolerance=options.tolerance, starts_at=starts_at)
             self._tasks[source.name] = task
             if source.name in writers:
                 self._writers[writers[source.name]] = task
@@ -270,6 +281,10 @@ class Run:
             if not self.take(entry):
                 return False
         return True
+
+    def replayed(self, name: str) -> TaskReplay:
+        """Return the replay of a task that is executed."""
+        return self._tasks[name]
 
     def ends_in_doubt(self) -> list[TaskReplay]:
         """Return the edited tasks that may have ended where the recorded ones did not, or the other way round."""

@@ -234,10 +234,9 @@ def test_a_scan_stands_before_its_writes_unless_others_ran_in_its_middle(modeled
     assert late > 100
 
 
-def test_a_rack_that_an_overlap_stopped_replays(tmp_path):
-    """WORK takes longer than a tick: it overlaps (code 14), all stops, and runs again after the log was cleared."""
-    (tmp_path / "rack").mkdir()
-    rack = make(tmp_path / "rack", "modeled")
+def overlapped(folder: Path) -> Path:
+    """A recording in which WORK overlaps, and the rack runs again after its errors were cleared."""
+    rack = make(folder / "rack", "modeled")
     rack.operations.reload("WORK", SourceText("WORK.BLK", LONG_WORK))
 
     def steps(rack: Rack, number: int) -> None:
@@ -246,7 +245,12 @@ def test_a_rack_that_an_overlap_stopped_replays(tmp_path):
             rack.operations.clear_errors()
             rack.operations.run_all()
 
-    bag = record(rack, tmp_path / "bag", steps, slices=20)
+    return record(rack, folder / "bag", steps, slices=20)
+
+
+def test_a_rack_that_an_overlap_stopped_replays(tmp_path):
+    """WORK takes longer than a tick: it overlaps (code 14), all stops, and runs again after the log was cleared."""
+    bag = overlapped(tmp_path)
     stops = [item for item in messages(bag, Operation) if item.what == "stop_all"]
     assert [(item.task, item.detail) for item in stops] == [("WORK", "14"), ("WORK", "14")]
     report = replayed(bag)

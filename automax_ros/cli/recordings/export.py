@@ -1,7 +1,8 @@
-"""Write a recording to a table, as CSV or as NumPy arrays.
+"""Write a recording to a table, as CSV or as NumPy arrays, or what came from outside as a stimuli file.
 
 Without --scans: common memory, one row for each instant at which a watched variable changed, or every S seconds. With
---scans TASK: one row for each scan of the task, with what it latched and what it wrote back.
+--scans TASK: one row for each scan of the task, with what it latched and what it wrote back. With --stimuli FILE: what
+operator, ROS and stimuli did, for `automax run --simulated --stimuli FILE`, which then gives the same run.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from automax_ros.cli.options.values import (
     watch_list,
     window_of,
 )
+from automax_ros.cli.output.files import require_writable, write_text
 from automax_ros.cli.output.screen import share_shown
 from automax_ros.cli.output.signals import ended_by_signals
 from automax_ros.core.safe_file import is_direct
@@ -31,15 +33,30 @@ from automax_ros.recordings.tables.series import Progress
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax export``."""
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
-    add_output_argument(parser, "OUT", "the table to write: OUT.csv, or OUT.npz for NumPy", required=True)
+    add_output_argument(parser, "OUT", "the table to write: OUT.csv, or OUT.npz for NumPy")
     add_watch_argument(parser, "every simple common that is not a string")
     parser.add_argument("--scans", metavar="TASK", help="the scans of a task instead of common memory")
+    parser.add_argument(
+        "--stimuli",
+        type=Path,
+        metavar="FILE.yaml",
+        help="write what came from outside as a stimuli file, and the sources of reloads into a folder next to it",
+    )
+    parser.add_argument("--force", action="store_true", help="write over a stimuli file that is there")
     add_window_arguments(parser)
     add_grid_argument(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Export the recording."""
+    if arguments.stimuli is not None:
+        return _write_stimuli(arguments)
+    if arguments.force:
+        raise UsageError("--force is for --stimuli FILE.yaml: a table is written over anyway", "leave it out")
+    if arguments.output is None:
+        raise UsageError(
+            "the table needs a file", "--output OUT.csv, or --stimuli FILE.yaml for what came from outside"
+        )
     as_numpy = arguments.output.suffix.lower() == ".npz"
     require_another_file(arguments.bag, arguments.output)
     if not as_numpy and arguments.output.suffix.lower() != ".csv" and not is_direct(arguments.output):
@@ -48,6 +65,37 @@ def run(arguments: argparse.Namespace) -> int:
         rows = _write(arguments, as_numpy, progress)
     if sys.stderr.isatty():
         print(f"{arguments.output}: {count_of(rows, 'row')}", file=sys.stderr)
+    return 0
+
+
+def _write_stimuli(arguments: argparse.Namespace) -> int:
+    """Write the stimuli file, and the sources that it names."""
+    from automax_ros.replay.rerun.outside import recorded_outside  # a rack takes a while to load
+    from automax_ros.replay.rerun.stimuli_text import sources_folder, stimuli_text
+
+    path, window = arguments.stimuli, window_of(arguments)
+    for option, given in (("--output", arguments.output), ("--watch", arguments.watch), ("--scans", arguments.scans)):
+        if given is not None:
+            raise UsageError(f"{option} is for a table, --stimuli for what came from outside", "one after the other")
+    if path.suffix.lower() not in (".yaml", ".yml") and not is_direct(path):
+        raise UsageError(f"{path}: a stimuli file is written as .yaml", "name it FILE.yaml")
+    require_another_file(arguments.bag, path)
+    require_writable(path)
+    if path.exists() and not is_direct(path) and not arguments.force:
+        raise UsageError(f"{path} exists already, and may have been edited", "--force writes over it")
+    with ended_by_signals(), share_shown("export") as progress:
+        config, outside = recorded_outside(arguments.bag, progress)
+    title = f"What came from outside in {arguments.bag.name}, rack {config.name}"
+    folder = sources_folder(path)
+    made = stimuli_text(
+        arguments.bag, config, outside, title, folder=folder, from_ns=window.start_ns, to_ns=window.end_ns
+    )
+    for name, text in made.sources.items():
+        (path.parent / folder).mkdir(exist_ok=True)
+        write_text(path.parent / folder / name, text)
+    write_text(path, made.text)
+    if sys.stderr.isatty():
+        print(f"{path}: {made.entries} entries", file=sys.stderr)
     return 0
 
 

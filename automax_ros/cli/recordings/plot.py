@@ -1,6 +1,7 @@
 """Draw variables of a recording over time: analog lanes, logic lanes, errors of tasks.
 
-Variables of one unit share a lane. Values hold until they change; however long the recording, no peak is lost.
+Variables of one unit share a lane. A common that has a `scale` in the rack file is drawn in its unit, not in counts.
+Values hold until they change; however long the recording, no peak is lost.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw the picture."""
+    from automax_ros.replay.scans.scales import recorded_scales, traces_in_units  # takes a while to load
+
     output: Path = arguments.output
     require_picture_file(output)
     window = window_of(arguments)
@@ -50,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     width, height = arguments.size
     require_another_file(arguments.bag, output)
     with ended_by_signals(), share_shown("plot") as progress:
-        shown = traces(arguments.bag, names, window, progress)
+        shown = traces_in_units(traces(arguments.bag, names, window, progress), recorded_scales(arguments.bag))
         title = f"{shown.rack[:80]}: {arguments.bag.resolve().name[:80]}"
         if window.start_ns or window.end_ns is not None:
             end = seconds_text(round(shown.end_s * 10**9))

@@ -17,7 +17,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from automax_ros.cli.options.recording import split_seconds, storage_options
-from automax_ros.cli.options.ros import add_ros_arguments, config_of, names_file, prepare_ros, ros_arguments, space_of
+from automax_ros.cli.options.ros import (
+    add_ros_arguments,
+    add_wait_argument,
+    config_of,
+    names_file,
+    prepare_ros,
+    ros_arguments,
+    space_of,
+)
 from automax_ros.cli.options.values import add_output_argument, seconds_above_0
 from automax_ros.cli.output.screen import StatusLine
 from automax_ros.cli.output.signals import StopRequest, stop_signals
@@ -40,7 +48,6 @@ if TYPE_CHECKING:
     from automax_ros.ros.clients.recorder import LiveRecorder
     from automax_ros.ros.setup.arguments import RosArguments
 
-DEFAULT_WAIT_S = "10"
 _PATIENCE_S = 3.0
 """A rack that has been absent from the graph this long is reported, s."""
 _GAPS_SHOWN = 20
@@ -59,13 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--split-s", type=split_seconds, metavar="S", help="begin a new file each S seconds of rack time"
     )
     parser.add_argument("--compression", metavar="zstd|lz4|none", help="how the files are compressed (default: zstd)")
-    parser.add_argument(
-        "--wait",
-        type=seconds_above_0,
-        metavar="S",
-        default=DEFAULT_WAIT_S,
-        help=f"seconds to look for the rack (default: {DEFAULT_WAIT_S})",
-    )
+    add_wait_argument(parser)
     add_ros_arguments(parser)
 
 
@@ -85,15 +86,18 @@ def run(arguments: argparse.Namespace) -> int:
             print(RecordingError("AMX6800", folder, "exists already, not overwriting"), file=sys.stderr)
             return 2
         from automax_ros.ros.clients.recorder import LiveRecorder
+        from automax_ros.ros.setup.leaving import ended_within
 
         recorder = LiveRecorder(own, ros)
-        session = _Session(recorder, own, domain, stop)
+        session, code = _Session(recorder, own, domain, stop), 0
         try:
             if config is not None:
                 recorder.expect(config)
-            return session.record(folder, arguments.wait, arguments.duration, how, own_files)
+            code = session.record(folder, arguments.wait, arguments.duration, how, own_files)
+            return code
         finally:
-            recorder.close()
+            with ended_within(code):
+                recorder.close()
 
 
 @dataclass(frozen=True)

@@ -12,51 +12,41 @@ import json
 import sys
 from pathlib import Path
 
-from automax_ros.cli.options.values import add_window_arguments, option_number, whole_number, window_of
+from automax_ros.cli.options.replayed import (
+    add_task_argument,
+    add_tolerance_argument,
+    print_refused_sources,
+    task_files,
+    task_sources,
+    tolerance_of,
+    with_repair,
+)
+from automax_ros.cli.options.values import add_window_arguments, whole_number, window_of
 from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, where_of
 from automax_ros.cli.output.difference_figure import can_be_drawn, draw, traces
 from automax_ros.cli.output.files import require_different_files, require_picture_file
-from automax_ros.cli.output.screen import print_diagnostics, print_warning_count, share_shown
+from automax_ros.cli.output.screen import print_warning_count, share_shown
 from automax_ros.cli.output.signals import ended_by_signals
-from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.user_error import UsageError
 from automax_ros.parallel.job import ClusterFault, Workers
-from automax_ros.rackfile.reading.files import FileFault, read_task_source
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
 from automax_ros.replay.scans.report import ReplayReport
 from automax_ros.replay.scans.stored_rack import SourceRefused
 from automax_ros.replay.side_by_side import replay_side_by_side
 
-_TRUNCATED, _NO_RECORDING = "AMX6812", "AMX6810"
-
-
 _NS_A_BYTE = 20_000
 """Run time per byte of a recording, ns, about: 50 kB are a second of an example rack (decision)."""
-_MOST_COUNTS = 1e19
-"""Greatest possible difference between two values of a variable."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax replay``."""
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
-    parser.add_argument(
-        "--task",
-        action="append",
-        default=[],
-        metavar="NAME=FILE",
-        dest="tasks",
-        help="run this source in place of the recorded one; may be given again",
-    )
+    add_task_argument(parser, "run this source in place of the recorded one; may be given again")
     parser.add_argument(
         "--only", action="append", metavar="TASK,...", help="replay these tasks only (default: all of the recording)"
     )
-    parser.add_argument(
-        "--tolerance",
-        default="0",
-        metavar="COUNTS",
-        help="numbers that differ by at most this count as equal (default: 0, bit for bit)",
-    )
+    add_tolerance_argument(parser)
     add_window_arguments(parser)
     add_where_arguments(parser, "replay the files of a split recording")
     add_native_arguments(parser)
@@ -74,28 +64,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Replay; 1 if something differs, 2 if the recording or a source cannot be used."""
     options = _options(arguments)
-    files = _task_files(arguments.tasks)
+    files = task_files(arguments.tasks)
     read = {"BAG": arguments.bag, **{f"--task {name}": path for name, path in files.items()}}
     require_different_files(read, {"--plot": arguments.plot})
     if arguments.plot is not None:
         require_picture_file(arguments.plot)
     where = where_of(arguments)
-    new = {name: _source(name, path) for name, path in files.items()}
+    new = task_sources(files)
     for name in new:
         if options.only is not None and name not in options.only:
             raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
     try:
         report = _run_replay(Replay(arguments.bag, new, options), where, arguments)
     except SourceRefused as error:
-        for source, diagnostics in error.findings:
-            print_diagnostics(diagnostics, source, sys.stderr)
-        print(f"automax replay: errors in {error}; nothing is replayed", file=sys.stderr)
+        print_refused_sources("replay", error, "nothing is replayed")
         return 2
     except ClusterFault as fault:
         print(fault, file=sys.stderr)
         return 2
     except BagError as error:
-        print(_with_repair(error, arguments.bag), file=sys.stderr)
+        print(with_repair(error, arguments.bag), file=sys.stderr)
         return 2
     return 0 if report.identical else 1
 
@@ -136,7 +124,7 @@ def _options(arguments: argparse.Namespace) -> ReplayOptions:
             raise UsageError("--only names no task")
     return ReplayOptions(
         only,
-        option_number("--tolerance", arguments.tolerance, 0.0, _MOST_COUNTS),
+        tolerance_of(arguments),
         window.start_ns,
         window.end_ns,
         arguments.max_differences,
@@ -148,31 +136,3 @@ def _expected_ns(bag: Path) -> int:
     """Return the approximate duration of a recording, ns, by its size; 0 for one that cannot be read."""
     files = list(bag.glob("*.mcap")) if bag.is_dir() else [bag]
     return sum(file.stat().st_size for file in files if file.is_file()) * _NS_A_BYTE
-
-
-def _task_files(texts: list[str]) -> dict[str, Path]:
-    files: dict[str, Path] = {}
-    for text in texts:
-        name, equals, file = text.partition("=")
-        name = name.strip().upper()
-        if not (name and equals and file):
-            raise UsageError(f"--task {text[:80]!r} is not NAME=FILE", "for example --task SPEED=new/SPEED.BLK")
-        if name in files:
-            raise UsageError(f"--task {name} is given twice")
-        files[name] = Path(file)
-    return files
-
-
-def _source(name: str, path: Path) -> SourceText:
-    try:
-        return read_task_source(path)
-    except FileFault as fault:
-        raise UsageError(f"--task {name}: {path} {fault}") from fault
-
-
-def _with_repair(error: BagError, bag: Path) -> BagError:
-    """Return the error; for an unfinished recording, with a hint to repair it."""
-    unfinished = error.code == _TRUNCATED or (error.code == _NO_RECORDING and any(bag.glob("*.mcap")))
-    if not unfinished:
-        return error
-    return BagError(error.code, error.place, error.message, f"`automax bag repair {bag}` saves what is whole of it")

@@ -13,10 +13,11 @@ from automax_ros.drive.current_loop.faults import KINDS
 from automax_ros.drive.current_loop.regulator import FULL
 from automax_ros.messages.types.messages import PlantState
 from automax_ros.recordings.read.common_log import Watched
-from automax_ros.recordings.tables.traces import Course, Line, TraceRole
+from automax_ros.recordings.tables.traces import Line, TraceRole
 from automax_ros.replay.drive_report.drive_signals import SPEED_REF, RecordedSignal, ReportDrive
 from automax_ros.replay.drive_report.drive_totals import CountTotals, PlantTotals, rpm_of
 from automax_ros.replay.drive_report.happenings import MOST_EVENTS, Happenings
+from automax_ros.replay.drive_report.numbers import Measured, SignalNumbers
 
 FAULTS = tuple(kind.output.upper() for kind in KINDS)
 """The fault outputs of DC_DRIVE_CML (52.2.2)."""
@@ -31,6 +32,9 @@ STATES = {
 }
 """Booleans of a drive and the meanings of their edges, rising and falling."""
 DRAWN_STATES = ("CML_RUN", "DC_CML_STATE", "BRIDGE_POL")
+STATE = "DC_CML_STATE"
+HELD = ("I_FDBK", "REF_LAG_OUT")
+"""The currents of a loop, which keep their last values in standby (52.2.1): they count while it runs (decision)."""
 SUSPECT = "BAD_SCR_NUM"
 """The output with the number of a suspected SCR: that one or its anti-parallel partner (52.3.1)."""
 MOST_BROKEN = 40
@@ -71,7 +75,7 @@ class DriveRun:
     starts: int = 0
     changes: int = 0
     _values: dict[str, float] = field(default_factory=dict)
-    _courses: dict[tuple[str, str, DataType, TraceRole], Course] = field(default_factory=dict)
+    _courses: dict[tuple[str, str, DataType, TraceRole], Measured] = field(default_factory=dict)
     _begun: dict[str, float] = field(default_factory=dict)
     _time_s: float | None = None
     _broken: tuple[str, ...] = ()
@@ -101,6 +105,10 @@ class DriveRun:
             self._note(time_s, signal, before, value)
         for keyword in seen:
             self._draw(time_s, self.drive.signals[keyword])
+        if STATE in seen:  # what a loop's currents are does not change with it, whether they count does
+            for keyword in HELD:
+                if keyword in self._values and keyword not in seen:
+                    self._draw(time_s, self.drive.signals[keyword])
 
     def _pass_to(self, time_s: float) -> None:
         if self._time_s is not None and time_s > self._time_s:
@@ -109,9 +117,14 @@ class DriveRun:
                 time_s - self._time_s,
                 self._percent("I_FDBK"),
                 None if speed is None else 100 * speed / FULL,
-                running=self._values.get("DC_CML_STATE", 1.0) != 0.0,
+                running=self.is_running,
             )
         self._time_s = time_s
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the loop runs; TRUE where that is not recorded."""
+        return self._values.get(STATE, 1.0) != 0.0
 
     def _percent(self, keyword: str) -> float | None:
         """Return a current, % of rated; None if it is unknown."""
@@ -134,10 +147,10 @@ class DriveRun:
             text = STATES[keyword][0 if on else 1]
             if text:
                 self.happened.add_event(time_s, "state", f"{text} ({signal.variable})")
-        if keyword == "DC_CML_STATE":
+        if keyword == STATE:
             self.starts += on
         elif keyword == "BRIDGE_POL":
-            self.changes += self._values.get("DC_CML_STATE", 1.0) != 0.0
+            self.changes += self.is_running
 
     def _note_fault(self, time_s: float, signal: RecordedSignal, *, on: bool) -> None:
         keyword = signal.keyword
@@ -150,7 +163,8 @@ class DriveRun:
             span = FaultSpan(keyword, signal.variable, what, self._begun.pop(keyword), time_s)
             if len(self.faults) < MOST_EVENTS:
                 self.faults.append(span)
-            self.happened.add_event(time_s, "fault", f"no fault any more: {what} ({keyword} {signal.variable})")
+            gone = f"no fault any more: {what} ({keyword} {signal.variable})"
+            self.happened.add_event(time_s, "fault", gone, is_end=True)
 
     def _draw(self, time_s: float, signal: RecordedSignal) -> None:
         keyword = signal.keyword
@@ -161,7 +175,12 @@ class DriveRun:
             unit, convert = _CONVERSIONS[keyword]
             found = convert(self)
             shown = (unit, found) if found is not None else ("counts", self._values[keyword])
-            self._append(label, shown[0], DataType.REAL, time_s, shown[1], _ROLES.get(keyword, TraceRole.OTHER))
+            role = _ROLES.get(keyword, TraceRole.OTHER)
+            if keyword in HELD and not self.is_running:
+                if (course := self._courses.get((label, shown[0], DataType.REAL, role))) is not None:
+                    course.pause(time_s)
+                return
+            self._append(label, shown[0], DataType.REAL, time_s, shown[1], role)
         elif keyword == SPEED_REF:
             self._draw_reference(label, time_s, signal)
         elif keyword.startswith("register "):
@@ -171,7 +190,11 @@ class DriveRun:
         self, label: str, unit: str, kind: DataType, time_s: float, value: float, role: TraceRole = TraceRole.OTHER
     ) -> None:
         if isfinite(value):
-            self._courses.setdefault((label, unit, kind, role), Course()).append(time_s, value)
+            key = label, unit, kind, role
+            course = self._courses.get(key)
+            if course is None:
+                course = self._courses[key] = Measured()
+            course.take(time_s, value)
 
     def _draw_reference(self, label: str, time_s: float, signal: RecordedSignal) -> None:
         value = self._values[signal.keyword]
@@ -237,20 +260,40 @@ class DriveRun:
             what = signal.text.removeprefix("fault: ").partition(";")[0]
             self.faults.append(FaultSpan(keyword, signal.variable, what, begin_s, None))
         self._begun.clear()
+        for course in self._courses.values():
+            course.numbers.finish(end_s)
         self.faults.sort(key=lambda span: (span.begin_s, FAULTS.index(span.keyword)))
 
     @property
     def lines(self) -> list[Line]:
         """The lines for a picture: speed, current, DELTA, counts, words of bits, then booleans; each group by role."""
+        return [
+            Line(Watched(label, number, 0, kind, unit), *self._courses[key].line(), role)
+            for number, key in enumerate(self._in_order)
+            for label, unit, kind, role in [key]
+        ]
+
+    @property
+    def numbers(self) -> list[SignalNumbers]:
+        """The numbers of what ``lines`` has, but for booleans."""
+        return [
+            SignalNumbers(label, unit, "", self._courses[key].numbers)
+            for key in self._in_order
+            for label, unit, kind, _ in [key]
+            if kind is not DataType.BOOLEAN
+        ]
+
+    @property
+    def _in_order(self) -> list[tuple[str, str, DataType, TraceRole]]:
         order = {
             unit: place for place, unit in enumerate((PERCENT_SPEED, "rpm", PERCENT_CURRENT, "A", DEGREES, "counts"))
         }
-        keys = sorted(self._courses, key=lambda key: (not key[1], order.get(key[1], len(order)), key[3]))
-        return [
-            Line(Watched(label, number, 0, kind, unit), *self._courses[key].line(), role)
-            for number, key in enumerate(keys)
-            for label, unit, kind, role in [key]
-        ]
+        return sorted(self._courses, key=lambda key: (not key[1], order.get(key[1], len(order)), key[3]))
+
+
+def is_shown(keyword: str) -> bool:
+    """Whether a report shows the signal of a drive with this keyword, or needs it for another one."""
+    return keyword in _NEEDED or keyword in STATES or keyword in FAULTS or keyword.startswith("register ")
 
 
 def _cause_first(item: tuple[str, float]) -> int:
@@ -274,6 +317,7 @@ _CONVERSIONS: dict[str, tuple[str, Callable[[DriveRun], float | None]]] = {
     "DELTA": (DEGREES, DriveRun.degrees),
 }
 """Numbers that are drawn: unit and conversion; counts are drawn if the scale is unknown."""
+_NEEDED = frozenset({*_CONVERSIONS, SPEED_REF, SUSPECT, "LINE_PERIOD"})
 _ROLES = {
     "REFERENCE": TraceRole.REFERENCE,
     "REF_LAG_OUT": TraceRole.LAGGED,

@@ -10,7 +10,8 @@ from automax_ros.core.text import quoted
 from automax_ros.core.types import DataType
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.base.nameplate import DriveParameters
-from automax_ros.drive.pmi.registers import COMMAND_REGISTERS, CURRENT, FEEDBACK_REGISTERS, SPEED
+from automax_ros.drive.pmi.pmi import USUAL_RATIO
+from automax_ros.drive.pmi.registers import COMMAND_REGISTERS, CURRENT, FEEDBACK_REGISTERS, REFERENCE, SPEED
 from automax_ros.language.printer import print_expression
 from automax_ros.language.program import Program
 from automax_ros.language.tree.tree import Element, Expression, Reference, Scope, Unary
@@ -146,6 +147,7 @@ def _report_drive(
     reference = reference or _named_reference(drive, config)
     if reference is not None:
         signals[SPEED_REF] = reference
+    ratio = lim_bar.value if lim_bar is not None else USUAL_RATIO if drive.letter else None
     hertz = data.parameters.line_hz if data is not None else line_hz.value if line_hz is not None else None
     return ReportDrive(
         drive.name,
@@ -154,7 +156,7 @@ def _report_drive(
         signals,
         unseen,
         data.parameters if data is not None else None,
-        lim_bar.value if lim_bar is not None else None,
+        ratio,
         hertz or 60.0,
     )
 
@@ -202,7 +204,7 @@ def _of_registers(drive: RackDrive, config: RackConfig) -> dict[str, RecordedSig
     }
 
 
-_KEYWORDS = {CURRENT: "I_FDBK", SPEED: "SPEED_FDBK"}
+_KEYWORDS = {REFERENCE: "REFERENCE", CURRENT: "I_FDBK", SPEED: "SPEED_FDBK"}
 """Keywords of a current minor loop for registers of a PMI; 4095 counts are full scale of both (36)."""
 _WORDS = {item.number: item.meaning for item in (*COMMAND_REGISTERS, *FEEDBACK_REGISTERS) if item.bits}
 """Meanings of the PMI registers that are words of bits, which are not drawn with numbers."""

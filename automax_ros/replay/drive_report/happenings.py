@@ -20,16 +20,22 @@ LONGEST = 300
 """Longest text of an event."""
 TOGETHER_NS = NS_PER_S // 10
 """Values that follow each other this closely are one course: the samples of a ramp or a sine (decision)."""
+_SENT_LATER = ("plant", "web", "operation")
 _WHO = {WriterKind.ROS: "ROS sets", WriterKind.OPERATOR: "set"}
 
 
 @dataclass(frozen=True)
 class DriveEvent:
-    """An event, at s of the run. ``kind``: ``state``, ``fault``, ``error``, ``plant`` or ``operation``."""
+    """An event, at s of the run.
+
+    ``kind``: ``state``, ``fault``, ``alarm``, ``error``, ``plant``, ``web`` or ``operation``. ``is_end``: a fault or
+    alarm is gone with it.
+    """
 
     time_s: float
     kind: str
     text: str
+    is_end: bool = False
 
 
 @dataclass
@@ -37,6 +43,7 @@ class _Written:
     """A value that was written, and those that followed it closely."""
 
     begin_ns: int
+    number: int
     writer: WriterKind
     first: Cell
     end_ns: int
@@ -49,7 +56,8 @@ class ValuesSet:
 
     def __init__(self) -> None:
         self._open: dict[str, _Written] = {}
-        self._ended: list[tuple[int, str]] = []
+        self._ended: list[tuple[int, int, str]] = []
+        self._begun = 0
         self._values: dict[str, Cell] = {}
         self.omitted = 0
 
@@ -64,14 +72,14 @@ class ValuesSet:
                 before.end_ns, before.last, before.more = time_ns, value, before.more + 1
                 continue
             self._end(name)
-            self._open[name] = _Written(time_ns, writer, value, time_ns, value)
+            self._begun += 1
+            self._open[name] = _Written(time_ns, self._begun, writer, value, time_ns, value)
 
     def events(self) -> list[DriveEvent]:
         """Return all writes as events, in the order of time."""
         for name in list(self._open):
             self._end(name)
-        ended = sorted(self._ended, key=lambda item: item[0])
-        return [DriveEvent(time_ns / NS_PER_S, "operation", cut(text)) for time_ns, text in ended]
+        return [DriveEvent(time_ns / NS_PER_S, "operation", cut(text)) for time_ns, _, text in sorted(self._ended)]
 
     def _end(self, name: str) -> None:
         written = self._open.pop(name, None)
@@ -84,7 +92,7 @@ class ValuesSet:
         if written.more:
             end = seconds_text(written.end_ns)
             text += f", then {written.more} more values to {source_text(written.last)} at {end} s"
-        self._ended.append((written.begin_ns, text))
+        self._ended.append((written.begin_ns, written.number, text))
 
 
 @dataclass
@@ -95,16 +103,20 @@ class Happenings:
     omitted: int = 0
     _counts: Counter[str] = field(default_factory=Counter)
 
-    def add_event(self, time_s: float, kind: str, text: str) -> None:
-        """Add an event."""
+    def add_event(self, time_s: float, kind: str, text: str, *, is_end: bool = False) -> None:
+        """Add an event; ``is_end`` as of ``DriveEvent``."""
         self._counts[kind] += 1
         if self._counts[kind] <= MOST_EVENTS:
-            self.events.append(DriveEvent(time_s, kind, cut(text)))
+            self.events.append(DriveEvent(time_s, kind, cut(text), is_end))
         else:
             self.omitted += 1
 
     def finish(self, values_set: ValuesSet) -> None:
-        """Sort the events by time; at one instant, values that were set come first, for the rest follows from them."""
+        """Sort the events by time; at one instant, values that were set come first, for the rest follows from them.
+
+        What is told of plants and of other operations comes last: a rack sends it after its scans.
+        """
+        self.events.sort(key=lambda event: event.kind in _SENT_LATER)
         self.events[:0] = values_set.events()
         self.omitted += values_set.omitted
         self.events.sort(key=lambda event: event.time_s)

@@ -1,21 +1,28 @@
-"""The report on a recorded rack without a drive: its tasks, watched commons, errors and operations."""
+"""The report on a recorded rack: watched signals, alarms, tasks, drives, and what happened."""
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.core.types import DataType
-from automax_ros.messages.types.messages import NAMES, Operation, Scan
-from automax_ros.rackfile.model.value_names import watched
+from automax_ros.language.program import Program
+from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.run_facts import run_facts
 from automax_ros.recordings.tables.series import WHOLE_RUN, Progress, Window
-from automax_ros.recordings.tables.traces import Traces, traces
-from automax_ros.replay.drive_report.happenings import Happenings, ValuesSet, error_text, operation_text
-from automax_ros.replay.scans.stored_rack import stored_rack
+from automax_ros.recordings.tables.traces import MAX_LINES, Traces
+from automax_ros.replay.drive_report.drive_report import DriveReport, drive_reader
+from automax_ros.replay.drive_report.happenings import Happenings
+from automax_ros.replay.drive_report.line_run import LineRun
+from automax_ros.replay.drive_report.line_signals import alarm_signals, line_signals
+from automax_ros.replay.drive_report.numbers import AlarmRun, SignalNumbers
+from automax_ros.replay.drive_report.reading import PartReader, RunRead, read_run
+from automax_ros.replay.scans.stored_rack import StoredRack, stored_rack
+
+_OF_A_DRIVE = ("state", "fault", "plant")
+"""Kinds of a drive's events that the rack's own sequence has not."""
 
 
 @dataclass(frozen=True)
@@ -31,55 +38,99 @@ class TaskRun:
 
 @dataclass(frozen=True)
 class RackReport:
-    """The commons that the rack file watches, over time, the tasks in the order of slots, and the events."""
+    """The report on a rack.
+
+    Attributes:
+        traces: the watched signals, plants in the background, alarms that came, errors; for a picture.
+        tasks: in the order of slots.
+        happened: the events of the rack and of its drives.
+        numbers: those of all signals that are shown.
+        alarms: in the order of the rack file.
+        drives: those of the rack, in the order of slots.
+        has_webs: whether the rack has webs, or plants with a roll or roller.
+        held: the watched currents of loops, which are shown and counted while their loops run.
+        has_line: whether rack file or user name signals or alarms, or the rack has webs or no drive: otherwise the
+            drives alone are shown (decision).
+    """
 
     traces: Traces
     tasks: tuple[TaskRun, ...]
     happened: Happenings
+    numbers: tuple[SignalNumbers, ...]
+    alarms: tuple[AlarmRun, ...]
+    drives: DriveReport
+    has_webs: bool
+    held: tuple[str, ...]
+    has_line: bool
 
 
-def rack_report(bag: Path, window: Window = WHOLE_RUN, progress: Progress | None = None) -> RackReport:
-    """Return the report on the rack of a recording.
+def rack_report(
+    bag: Path,
+    window: Window = WHOLE_RUN,
+    progress: Progress | None = None,
+    watch: Sequence[str] | None = None,
+    references: Mapping[str, str] | None = None,
+) -> RackReport:
+    """Return the report on the rack of a recording, which is read once.
+
+    ``watch`` are names of what to show in place of what the rack file watches: commons, elements of arrays, locals such
+    as ``SPEED.RATIO%``, signals of plants such as ``UNWIND/current_a``. ``references`` are commons with speed
+    references, by the name of their drive.
 
     Raises:
-        BagError: the recording cannot be read, or has no data in the window.
+        BagError: the recording cannot be read, a name is unknown, or the window has no data.
         SourceRefused: the rack file stored inside has errors.
     """
     reader = BagReader(bag)
     stored = stored_rack(reader)
-    programs = {program.name: program for program in stored.programs()}
-    facts = run_facts(reader).table
-    recorded = {item.name for item in facts.variables}
-    names = [
-        item.label
-        for item in watched(stored.config, None, programs.values())
-        if item.name in recorded and item.variable.type is not DataType.STRING
-    ]
-    happened, values_set = Happenings(), ValuesSet()
-    scans: Counter[str] = Counter()
-    errors: Counter[str] = Counter()
+    config = stored.config
+    recorded = {item.name for item in run_facts(reader).table.variables}
+    programs = stored.programs()
+    signals = line_signals(bag, config, programs, recorded, watch)
+    if len(signals) > MAX_LINES:
+        raise BagError("AMX6826", bag, f"{len(signals)} variables for one picture: {MAX_LINES} are the limit")
+    drives = drive_reader(stored, window, None, references)
+    held = None if drives is None else drives.held
+    line = LineRun(signals, alarm_signals(config, recorded), held, config.plants)
+    parts: list[PartReader] = [line] if drives is None else [line, drives]
+    read = read_run(bag, parts, window, progress)
+    of_drives = DriveReport(config.name, 0.0, 0.0, ()) if drives is None else drives.report(read)
+    shown = _traces(line, read, window)
+    for run, _ in of_drives.drives:
+        for event in run.happened.events:
+            if event.kind in _OF_A_DRIVE:
+                line.happened.add_event(
+                    event.time_s, event.kind, f"{run.drive.name}: {event.text}", is_end=event.is_end
+                )
+    line.happened.finish(read.values_set)
+    return RackReport(
+        traces=shown,
+        tasks=tuple(_tasks(stored, programs, line)),
+        happened=line.happened,
+        numbers=line.numbers,
+        alarms=line.alarms,
+        drives=of_drives,
+        has_webs=line.has_webs,
+        held=tuple(line.held),
+        has_line=watch is not None or bool(config.watch or config.alarms) or line.has_webs or drives is None,
+    )
 
-    def take_scan(time_ns: int, scan: Scan) -> None:
-        scans[scan.task] += 1
-        errors[scan.task] += len(scan.errors)
-        for error in scan.errors:
-            happened.add_event(time_ns / NS_PER_S, "error", f"{scan.task}: {error_text(error.code, error.line)}")
 
-    half = None if progress is None else lambda share: progress(share / 2)
-    shown = traces(bag, names, window, half, take_scan, values_set.take)
-    rest = BagReader(bag)
-    rest.on_progress = None if progress is None else lambda share: progress((1 + share) / 2)
-    for entry in rest.messages(types=frozenset({NAMES[Operation]})):
-        message = entry.message
-        assert isinstance(message, Operation)
-        time_ns = message.stamp - facts.stamp
-        if window.holds(time_ns) and (text := operation_text(message)):
-            happened.add_event(time_ns / NS_PER_S, "operation", text)
-    happened.finish(values_set)
-    tasks = []
+def _traces(line: LineRun, read: RunRead, window: Window) -> Traces:
+    end_s = read.end_ns / NS_PER_S
+    line.finish(end_s)
+    lines = line.lines
+    first = min((float(item.times[0]) for item in lines if len(item.times)), default=window.start_ns / NS_PER_S)
+    start_s = max(window.start_ns / NS_PER_S, first)  # a file of a split recording begins later
+    return Traces(read.rack, start_s, end_s, lines, tuple(line.marks.marks), line.marks.unmarked)
+
+
+def _tasks(stored: StoredRack, programs: Sequence[Program], line: LineRun) -> list[TaskRun]:
+    by_name = {program.name: program for program in programs}
+    found = []
     for module, task in stored.config.placed_tasks:
-        program = programs.get(task.name)
+        program = by_name.get(task.name)
         period_ns = program.period_ns if program is not None else 0
         where = f"{module.model} in slot {module.slot}"
-        tasks.append(TaskRun(task.name, where, period_ns, scans[task.name], errors[task.name]))
-    return RackReport(shown, tuple(tasks), happened)
+        found.append(TaskRun(task.name, where, period_ns, line.scans[task.name], line.errors[task.name]))
+    return found

@@ -309,6 +309,11 @@ class ReplayMemory:
         return self._in_step and self._write_count == len(self._writes)
 
     @property
+    def writes_made(self) -> int:
+        """The number of writes by the scan's BASIC statements so far."""
+        return self._write_count
+
+    @property
     def recorded_writes(self) -> list[Entry]:
         """The writes of the recorded scan's BASIC statements, in their order."""
         return self._writes

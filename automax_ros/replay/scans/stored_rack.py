@@ -17,7 +17,7 @@ from automax_ros.core.text import did_you_mean
 from automax_ros.language.checks.checker import CheckResult
 from automax_ros.language.program import CommonSpec, Program, lines_that_write
 from automax_ros.messages.types.messages import VariableTable
-from automax_ros.messages.types.rack_files import RACK_FILE
+from automax_ros.messages.types.rack_files import RACK_FILE, RackFile
 from automax_ros.rackfile.checks.tasks import check_source, commons_of
 from automax_ros.rackfile.loader import load_stored
 from automax_ros.rackfile.model.config import CommonVariable, RackConfig
@@ -209,13 +209,19 @@ def stored_rack(reader: BagReader) -> StoredRack:
             "topic /<rack>/config too"
         )
         raise BagError("AMX6830", bag, "has no rack.yaml inside, so its tasks cannot be executed again", hint)
-    source = SourceText(f"{bag.name}:{RACK_FILE}", stored.rack_file)
-    result = load_stored(source, Path(RACK_FILE))
-    if result.config is None:
-        raise SourceRefused([(source, result.diagnostics)])
-    first = {name: texts[0] for name, texts in stored.sources.items()}
-    later = {name: tuple(texts[1:]) for name, texts in stored.sources.items()}
-    return StoredRack(bag, result.config, first, later)
+    return stored.rack()
+
+
+def rack_of_files(place: Path, files: Iterable[RackFile]) -> StoredRack:
+    """Return the rack of files that a running rack has sent; ``place`` is its name in messages.
+
+    Raises:
+        SourceRefused: the rack file has errors, or is not among them.
+    """
+    stored = _StoredFiles(place)
+    for file in files:
+        stored.keep(file.name, file.data)
+    return stored.rack()
 
 
 def unknown_value(bag: Path, source: ReplaySource, variable: CommonVariable, when: str) -> BagError:
@@ -254,3 +260,13 @@ class _StoredFiles:
         if source not in known and self._count < _MOST_SOURCES + MOST_RELOADS:
             self._count += 1
             known.append(source)
+
+    def rack(self) -> StoredRack:
+        """Return the rack of the kept files."""
+        source = SourceText(f"{self._bag.name}:{RACK_FILE}", self.rack_file)
+        result = load_stored(source, Path(RACK_FILE))
+        if result.config is None:
+            raise SourceRefused([(source, result.diagnostics)])
+        first = {name: texts[0] for name, texts in self.sources.items()}
+        later = {name: tuple(texts[1:]) for name, texts in self.sources.items()}
+        return StoredRack(self._bag, result.config, first, later)

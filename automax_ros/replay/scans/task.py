@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 from automax_ros.core.kinds import WriteKind
@@ -29,8 +30,12 @@ _QUIET_SCANS = 2
 """A task that has not scanned for more periods than this no longer runs."""
 
 
-def execute(bag: Path, task: Task, scan: Scan, now_ns: int) -> ScanRecord | None:
-    """Execute a scan at an instant of rack time; None if the task no longer runs.
+Scanned = Callable[[int, int], ScanRecord | None]
+"""Executes a scan: rack time in ns, and how many were skipped before it."""
+
+
+def execute(bag: Path, task: Task, scan: Scan, now_ns: int, scanned: Scanned) -> ScanRecord | None:
+    """Execute a scan at an instant of rack time, by ``scanned``; None if the task no longer runs.
 
     Raises:
         BagError: it cannot be executed with the recorded state, which no task can have.
@@ -39,7 +44,7 @@ def execute(bag: Path, task: Task, scan: Scan, now_ns: int) -> ScanRecord | None
         if scan.scan == 0:
             return task.run(now_ns)
         task.scan_number = scan.scan - 1
-        return _overlap(task, scan, now_ns) or task.scan(now_ns, scan.skipped)
+        return _overlap(task, scan, now_ns) or scanned(now_ns, scan.skipped)
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         what = f"scan {scan.scan} of task {task.name} cannot be executed: {error}"
         hint = "its recorded state is none that the task can have"
@@ -305,10 +310,13 @@ class TaskReplay:
         if scan.scan == 0:
             self._stopped_in = None
         # Rack time: on the wall clock stamps are the time of day.
-        record = execute(self._bag, self._task, scan, max(0, scan.stamp - self._tallies.origin))
+        record = execute(self._bag, self._task, scan, max(0, scan.stamp - self._tallies.origin), self._scanned)
         if record is not None and self._task.status is not Status.RUNNING:
             self._stopped_in = scan.scan
         return record
+
+    def _scanned(self, now_ns: int, skipped: int) -> ScanRecord | None:
+        return self._task.scan(now_ns, skipped)
 
     def _compare_state(self, state: TaskState) -> None:
         self._states += 1

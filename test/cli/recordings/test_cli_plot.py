@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from recordings.independent import GOLDEN, steps_of
 from recordings.recordings import MS, TABLE, image_of, record, sample_recording, write_of
+from system.support import ROOT
 
 from automax_ros.cli.output.figure import FigureLayout, figure_of, save
 from automax_ros.core.types import DataType
@@ -75,6 +76,18 @@ def test_variables_of_one_unit_share_a_lane():
     assert [label.get_text() for label in figure.axes[2].get_yticklabels()] == ["RUN@", "READY@"]
     separate = figure_of(shown, FigureLayout("t", separate=True))
     assert [axis.get_ylabel() for axis in separate.axes] == ["counts", "fpm", "counts", ""]
+
+
+def test_a_common_with_a_scale_is_drawn_in_its_unit(automax, monkeypatch):
+    """Counts of a transducer share the lane of the web's tension in N, and cover it."""
+    figures = []
+    monkeypatch.setattr("automax_ros.cli.recordings.plot.save", lambda figure, _: figures.append(figure))
+    line = ROOT / "bags" / "paper_line"
+    assert automax("plot", line, "TENSION_1%", "W1/tension_n", "-o", "OUT.png").code == 0
+    (axis,) = figures[0].axes
+    assert axis.get_ylabel() == "N"
+    transducer, web = (drawn.get_ydata() for drawn in lines_of(figures[0]).values())
+    assert max(transducer) == pytest.approx(max(web), abs=1000 / 4095)
 
 
 def test_legends_stand_beside_the_data_and_nothing_is_cut_off():

@@ -5,6 +5,7 @@ import os
 import re
 import struct
 import zlib
+from math import nan
 
 import pytest
 
@@ -69,7 +70,9 @@ def test_totals_from_counts_alone(automax, bag):
     assert totals["bridge"] == "1 change while it ran"
     assert totals["faults"] == "1, 1 in the task's error log"
     whole, in_run = (squares / 6.0) ** 0.5, (squares / 2.8) ** 0.5
-    assert totals["rms current by I_FDBK"] == f"{whole:.1f} % of rated over 6.000 s, {in_run:.1f} % in run"
+    assert totals["rms current by I_FDBK"] == (
+        f"{in_run:.1f} % of rated over 2.800 s in run; {whole:.1f} % over all 6.000 s, 0 in standby"
+    )
     assert totals["greatest I_FDBK"] == "75.0 % of rated"
     heat = OHM * squares / 1e4 * AMPS**2
     assert float(totals["armature heat by I_FDBK"].split()[0]) == pytest.approx(heat / 1000, rel=1e-3)
@@ -170,7 +173,9 @@ def test_courses_are_in_engineering_units(automax, bag):
         recording.plant(2.0, speed_rpm=875.0, current_a=AMPS / 4)
     lines = lines_of(automax.folder / "bag")
     assert list(lines["DELTA DELTA%"].values) == pytest.approx([0.0, 4167 * 60e-6 * 360])
-    assert list(lines["I_FDBK CUR_FB%"].values) == pytest.approx([0, 2048 / 4095 * 150, -1024 / 4095 * 150])
+    assert list(lines["I_FDBK CUR_FB%"].values) == pytest.approx(
+        [0, 2048 / 4095 * 150, -1024 / 4095 * 150, nan], nan_ok=True
+    )  # from the start of the loop to its stop
     assert list(lines["SPEED_FDBK SPD%"].values) == pytest.approx([0, 2048 / 40.95])
     assert list(lines["speed of the plant"].values) == pytest.approx([50.0])
     assert list(lines["current of the plant"].values) == pytest.approx([25.0], rel=1e-4)
@@ -192,7 +197,7 @@ def test_delta_counts_against_the_measured_period(automax, bag):
 
 def test_without_lim_bar_currents_are_counts(automax, bag):
     with bag(task=loop_task(LIM_BAR="LEVEL%")) as recording:
-        recording.write(1.0, CUR_FB_I=2048)
+        recording.write(1.0, CUR_FB_I=2048, STATE_B=1)
     (line,) = [line for name, line in lines_of(automax.folder / "bag").items() if name == "I_FDBK CUR_FB%"]
     assert (line.variable.unit, line.values[-1]) == ("counts", 2048)
 
@@ -402,11 +407,11 @@ def test_a_drive_of_a_udc_is_reported_as_far_as_it_is_known(automax, bag):
     lines = lines_of(folder)
     speed = [lines[label] for label in ("SPEED_FDBK SPD%", "speed of the plant")]
     assert [line.variable.unit for line in speed] == ["% of full speed"] * 2  # finding 22: the fault word stood there
-    assert (lines["register 202 FAULTS%"].variable.unit, lines["register 101 CMD%"].variable.unit) == (
-        "faults, latched", "counts"
-    )  # fmt: skip
+    assert lines["register 202 FAULTS%"].variable.unit == "faults, latched"
+    currents = [lines[label].variable.unit for label in ("REFERENCE CMD%", "I_FDBK CUR%", "current of the plant")]
+    assert currents == ["% of rated current"] * 3
     assert lines["I_FDBK CUR%"].values[-1] == pytest.approx(200.0)
-    assert lines["register 101 CMD%"].values[-1] == 7
+    assert lines["REFERENCE CMD%"].values[-1] == pytest.approx(7 / 4095 * 200)
     assert lines["speed of the plant"].values[-1] == pytest.approx(10.0)
     assert not any("OTHER%" in name for name in lines)
     assert automax("report", "bag", "--output", "page.html").code == 0
@@ -460,7 +465,7 @@ def test_a_rack_without_a_drive_is_reported_as_far_as_it_goes(automax):
     assert (result.code, result.out, result.err) == (0, "", "")
     page = (automax.folder / "bag_report.html").read_text()
     assert ["LINE", "57C435 in slot 1", "11", "1", "1"] in cells_of(page)
-    told = [row for row in sequence_of(page) if row[1]]
+    told = [row for row in sequence_of(page) if row[1] not in ("", "kind")]
     assert [(time, kind) for time, kind, _ in told] == [("1.5000", "error"), ("3.0000", "operation")]
     assert told[0][2].startswith("LINE: AMX7001")
     assert told[1][2] == "stop: refused, it is critical"
@@ -567,3 +572,52 @@ def test_pipes_take_the_page_and_the_picture(automax, bag):
     os.mkfifo(automax.folder / "F")
     result = automax("report", "bag", "--output", "F")
     assert (result.code, "it is a pipe without a reader" in result.err) == (2, True)
+
+
+def test_faults_without_a_common_are_not_none(automax, bag):
+    """4: the page said that there were none."""
+    with bag(task=loop_task(IOC_OUT=None, TACH_LOSS_OUT=None, LINE_PERIOD=None)) as recording:
+        recording.write(1.0, REF_I=1)
+    automax("report", "bag", "--output", "page.html")
+    page = (automax.folder / "page.html").read_text()
+    assert "<p>Not recorded: no common carries a fault output of its loop.</p>" in page
+    assert "<p>None" not in page
+    assert totals_of(page)["faults"] == "not recorded, 0 in the task's error log"
+    with bag(name="some") as recording:
+        recording.write(1.0, REF_I=1)
+    automax("report", "some", "--output", "page.html")
+    page = (automax.folder / "page.html").read_text()
+    assert "<p>None of those that are recorded.</p>" in page
+    assert "no common carries them: SYNC_LOSS_OUT, OSV_OUT, " in page
+
+
+def test_what_a_loop_keeps_in_standby_is_a_gap_and_does_not_count(automax, bag):
+    """16: 8 s of standby had the current of the last scan, in the picture and in the mean; in the line's too."""
+    rack = rack_file() + "watch: [CUR_FB%]\n"
+    with bag(rack=rack) as recording:
+        recording.write(1.0, STATE_B=1, CUR_FB_I=1000)
+        recording.write(3.0, STATE_B=0)
+        recording.write(9.0, STATE_B=1, CUR_FB_I=2000)
+        recording.write(10.0, RUN_B=1)
+    report = rack_report(automax.folder / "bag")
+    (line,) = report.traces.lines
+    assert line.times.tolist() == [1.0, 3.0, 9.0]
+    assert line.values.tolist() == pytest.approx([1000.0, nan, 2000.0], nan_ok=True)
+    assert report.numbers[0].numbers.mean == pytest.approx((1000 * 2 + 2000 * 1) / 3)
+    ((run, _),) = report.drives.drives
+    (own,) = [item for item in run.numbers if item.label == "I_FDBK CUR_FB%"]
+    assert own.numbers.mean == pytest.approx((1000 * 2 + 2000 * 1) / 3 / 4095 * 150)
+    assert automax("report", "bag", "--output", "page.html", "--png", "page.png").code == 0
+    page = (automax.folder / "page.html").read_text()
+    assert "CUR_FB% is a current of a loop, which is shown and counted only while the loop runs" in page
+    assert "currents (I_FDBK, REF_LAG_OUT) are shown and counted only while it runs" in page
+
+
+def test_the_end_of_a_fault_is_not_red(automax, bag):
+    with bag() as recording:
+        run_of(recording)
+    automax("report", "bag", "--output", "page.html")
+    page = (automax.folder / "page.html").read_text()
+    row = page[: page.index("no fault any more")].rpartition("<tr")[2]
+    assert not row.startswith(" class")
+    assert page[: page.index("<td>fault: instantaneous")].rpartition("<tr")[2].startswith(' class="fault"')

@@ -1,0 +1,1 @@
+"""Tests of `automax_ros.replay.rerun`."""
