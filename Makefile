@@ -1,4 +1,4 @@
-# make setup   .venv with all dependencies, the package and its compiled messages   make run    the example rack
+# make setup   .venv with all dependencies, the package and its compiled messages   make run    the example rack, with its panel
 # make test    style, types and tests; CI runs the same                            make soak   the long tests
 # make bench   measurements                     make format   rewrite the style    make clean  remove what was built
 # make docs    the site of docs/, into site/
@@ -29,7 +29,7 @@ setup:
 
 # exec: Ctrl-C and the exit code are the program's own.
 run: setup
-	@exec $(BIN)/automax run $(CONFIG)
+	@exec $(BIN)/automax run $(CONFIG) --panel --operate
 
 # Every step runs, the first failure decides the result, pytest's summary comes last.
 test: setup
@@ -38,7 +38,7 @@ test: setup
 	$(BIN)/ruff format --check . || status=$$?; \
 	$(BIN)/mypy automax_ros tools || status=$$?; \
 	AUTOMAX_COMPILED=off $(BIN)/python -m pytest -q $(PLAIN) -m "not soak" $(PARALLEL) || status=$$?; \
-	$(BIN)/python -m pytest -q test -m "not soak" $(PARALLEL) || status=$$?; \
+	$(BIN)/python -m pytest -q -rs test -m "not soak" $(PARALLEL) || status=$$?; \
 	exit $$status
 
 soak: setup

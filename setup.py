@@ -50,6 +50,10 @@ EXTRAS = {
     "cluster": [
         "distributed>=2024.8",
     ],
+    # automax panel, automax run --panel: the server of the page.
+    "panel": [
+        "websockets>=16,<18",
+    ],
     # The site of docs/: `make docs`.
     "docs": [
         "mkdocs==1.6.1",
@@ -57,11 +61,13 @@ EXTRAS = {
     ],
     # The tools that judge style and types are pinned: another version judges differently.
     "test": [
+        "dbf>=0.99.11,<1",
         "distributed>=2024.8",
         "hypothesis>=6.100,<7",
         "jsonschema>=4.23,<5",
         "mcap-ros2-support>=0.5.5,<1",
         "mypy==2.4.1",
+        "playwright>=1.50,<2",
         "pytest>=8.2,<10",
         "pytest-timeout>=2.3,<3",
         "pytest-xdist>=3.7,<4",

@@ -30,7 +30,7 @@ class Group:
         return sorted(path for path in left if path.name != "__init__.py")
 
 
-_ASSESS = ("assessment", "drive_case", "drive_rules", "limits")
+_ASSESS = ("assessment", "drive_case", "drive_rules", "limits", "roll_rules")
 _COLD = ("drive/base/nameplate.py", "drive/circuit/steady.py", *(f"drive/assess/{name}.py" for name in _ASSESS))
 """Files that a drive's tools use only once: compiling takes longer than it saves."""
 

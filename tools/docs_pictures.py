@@ -1,8 +1,9 @@
 """Makes the pictures of the documentation from a simulated run of the example rack, so that they stay up to date.
 
 `.venv/bin/python tools/docs_pictures.py` writes them into docs/pictures/: the drawings of `automax report` and
-`automax plot` for the tour through config/dc_drive, and the terminal while the rack runs. The same rack and the same
-matplotlib give the same bytes.
+`automax plot` for the tour through config/dc_drive, that of `automax report` for bags/paper_line, those of
+`automax compare` and, for a task, `automax diagram` for config/section_drive, and the terminal while the rack runs. The
+same rack and the same matplotlib give the same bytes.
 """
 
 from __future__ import annotations
@@ -21,8 +22,17 @@ from automax_ros.rackfile.model.value_names import watched
 
 ROOT = Path(__file__).resolve().parent.parent
 RACK = ROOT / "config" / "dc_drive"
+SECTION = ROOT / "config" / "section_drive"
+PAPER = ROOT / "bags" / "paper_line"
 PICTURES = ROOT / "docs" / "pictures"
 PLOTTED = ("SPEED_REF%", "SPD%", "CUR_REF%", "CUR_FB%", "BRIDGE@", "F_SCR@")
+NIP = """\
+- {at: 0, set: {LINE_SPEED_SP%: 100}}
+- {at: 2.0, set: {NIP_CLOSED@: true}}
+"""
+SLOW = "- {at: 0, tune: {SPEED.KP_SPEED: 10.0}}\n"
+"""What happens to the section in the two runs that are compared, and what only the second one has: a lower gain."""
+COMPARED = ("SPEED_FDBK%", "CUR_REF%", "NIP_CLOSED@", "--reference", "SPEED_FDBK%=SECT_REF%", "--to", "8")
 SCREEN_S = (1, 3, 5, 8)
 """Seconds of the run at which the status line is shown."""
 _LETTER, _LINE, _EDGE = 8.0, 19, 14
@@ -36,7 +46,14 @@ def make(folder: Path) -> None:
         tour = ("--simulated", "--duration", "40", "--stimuli", RACK / "tour.yaml", "--record", bag)
         _automax("run", RACK, *tour)
         _automax("report", bag, "--png", folder / "report.png", "--speed-ref", "SPEED_REF%")
+        _automax("report", PAPER, "--png", folder / "line_report.png")
         _automax("plot", bag, *PLOTTED, "--to", "24", "--size", "1200x640", "-o", folder / "plot.png")
+        runs, stimuli = [Path(scratch) / name for name in ("before", "after")], Path(scratch) / "nip.yaml"
+        for run, entries in zip(runs, (NIP, NIP + SLOW), strict=True):
+            stimuli.write_text(entries, encoding="utf-8")
+            _automax("run", SECTION, "--simulated", "--duration", "12", "--stimuli", stimuli, "--record", run)
+        _automax("compare", *runs, *COMPARED, "--plot", folder / "compare.png", expected=1)
+    _automax("diagram", ROOT / "config" / "section_drive" / "SPEED.BLK", "-o", folder / "speed_diagram.svg")
     (folder / "screen.svg").write_text(screen(), encoding="utf-8")
 
 
@@ -93,8 +110,8 @@ class _Shown(TerminalOutput):
         """Discard the summary."""
 
 
-def _automax(*words: object) -> None:
-    if main([str(word) for word in words]):
+def _automax(*words: object, expected: int = 0) -> None:
+    if main([str(word) for word in words]) != expected:
         sys.exit(f"automax {words[0]} failed")
 
 

@@ -106,7 +106,7 @@ install -r "$venv/needed.txt"
 # The messages are compiled while pip, which mostly waits, brings the rest. A setup that fails or is interrupted ends when
 # pip has ended too, which holds the lock until then: half a package would look like a whole one.
 trap wait EXIT
-install --use-pep517 --editable '.[ros,build,plot,docs,test]' &
+install --use-pep517 --editable '.[ros,build,plot,panel,docs,test]' &
 rest=$!
 "$venv/bin/python" tools/build_messages.py
 wait "$rest"

@@ -24,26 +24,30 @@ SUBCOMMANDS: dict[str, str] = {
     "check": "find everything that is wrong with tasks and rack files",
     "trace": "run a task scan by scan on a CSV table",
     "compile": "print the function that a task becomes",
+    "diagram": "draw the block diagram of a task",
     "tune-info": "coefficients and limits of dynamic blocks in a task",
     "response": "step response and Bode diagram of a dynamic block",
     "sweep": "run a rack many times with other values, and measure",
     "load": "CPU load of each module by the manual's execution times",
+    "xref": "who writes and who reads each common of a rack",
     "drive-check": "judge drives by the manual's formulas, propose gains",
     "new": "make a rack file from a folder of tasks",
-    "import": "make a rack file from a configuration task",
+    "import": "make a rack file from a plant's disks",
     "convert": "make tasks of an old plant acceptable",
     "run": "run a rack",
     "node": "run one process of a rack that is distributed",
     "step": "step a rack: a tick, a scan, a BASIC line at a time",
+    "panel": "show a rack or a recording in the browser",
     "record": "record a rack that runs",
     "ctl": "operate a rack that runs: RUN, STOP, force, set, tune",
     "replay": "execute a recording again, find the first difference",
+    "rerun": "run a recorded rack again with an edit, in closed loop",
     "play": "send the messages of a recording again, with /clock",
     "bag": "tell what a recording holds, repair one",
     "export": "write common memory or scans of a recording to a table",
     "plot": "draw variables of a recording",
-    "report": "a drive's run as one HTML page and a picture",
-    "compare": "compare a block with the Logix instruction for it",
+    "report": "a rack's run as one HTML page and a picture",
+    "compare": "two recordings side by side: what differs, and when",
     "bridge": "steady state of an SCR bridge, or a motor's run on it",
     "blocks": "describe the control blocks",
     "security-policy": "SROS 2 policy and keys for a rack",
@@ -53,10 +57,32 @@ SUBCOMMANDS: dict[str, str] = {
 }
 """Every subcommand and its line of help; its module is imported only when it is used."""
 _FOLDERS = {
-    "tasks": ("check", "trace", "compile", "tune-info", "response", "convert", "compare", "blocks", "explain"),
-    "racks": ("sweep", "load", "drive-check", "new", "import", "step", "bridge", "security-policy", "schema"),
+    "tasks": (
+        "check",
+        "trace",
+        "compile",
+        "diagram",
+        "tune-info",
+        "response",
+        "convert",
+        "blocks",
+        "explain",
+    ),
+    "racks": (
+        "sweep",
+        "load",
+        "xref",
+        "drive-check",
+        "new",
+        "import",
+        "step",
+        "bridge",
+        "security-policy",
+        "schema",
+        "panel",
+    ),
     "run": ("run", "node"),
-    "recordings": ("record", "replay", "play", "bag", "export", "plot", "report"),
+    "recordings": ("record", "replay", "rerun", "play", "bag", "export", "plot", "report", "compare"),
     "operate": ("ctl",),
     "shell": ("completion",),
 }
@@ -64,7 +90,7 @@ _FOLDERS = {
 
 ROS_ARGUMENTS = "--ros-args"
 """The argument that introduces the ROS arguments of a command line."""
-UNTIL_STOPPED = ("run", "node", "record", "play")
+UNTIL_STOPPED = ("run", "node", "record", "play", "panel")
 """The subcommands that run until they are stopped."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as in the shell."""

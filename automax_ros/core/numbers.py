@@ -42,6 +42,11 @@ def round_count(value: float) -> int:
     return int(value + 0.5) if value >= 0.0 else int(value - 0.5)
 
 
+def nearest(value: float) -> int:
+    """Round to the nearest whole number, halves up (decision): as samples of waves and cells of tables are."""
+    return math.floor(value + 0.5)
+
+
 def sign_extended(value: int, bits: int) -> int:
     """Keep the low ``bits`` (1 to 32) of a number and extend their sign."""
     half = 1 << (bits - 1)

@@ -1,20 +1,26 @@
-"""The plants of a running rack: their state in snapshots, their signals in commons, their samples for streams."""
+"""The plants of a running rack and their webs: state in snapshots, signals in commons, samples for streams."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Protocol
 
 from automax_ros.core.kinds import WriterKind
-from automax_ros.core.types import Value
+from automax_ros.core.types import DataType, Value
 from automax_ros.drive.base.errors import DriveError
 from automax_ros.drive.base.state import SavedState
-from automax_ros.drive.plant.coupling import CoupledPlants
 from automax_ros.drive.plant.plant import DrivePlant
 from automax_ros.drive.plant.signals import SIGNALS
+from automax_ros.drive.web.data import MOST_DIAMETER_M
+from automax_ros.drive.web.end import WebEnd
+from automax_ros.drive.web.signals import END_SIGNALS, WEB_SIGNALS
+from automax_ros.drive.web.span import WebSpan
 from automax_ros.rack.base.observers import Observers
 from automax_ros.rack.operations.operations import Operations
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.plants import FeedConfig, PlantConfig, build_plants, couple_plants
+from automax_ros.rackfile.model.webs import WebConfig, build_line
 from automax_ros.rackfile.model.writers import writers_of
 from automax_ros.runtime.memory.memory import CommonMemory, ProcessInputs
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
@@ -24,40 +30,44 @@ _AFTER_MODULES = 16
 
 
 class _Feed:
-    __slots__ = ("_scale", "_signal", "element", "view", "writer")
+    __slots__ = ("_read", "_scale", "_type", "element", "view", "writer")
 
-    def __init__(self, config: FeedConfig, view: int, writer: int) -> None:
+    def __init__(self, config: FeedConfig, read: Callable[[], float], kind: DataType, view: int, writer: int) -> None:
         self.view, self.element, self.writer = view, config.element, writer
-        self._scale, self._signal = config.scale, SIGNALS[config.signal]
+        self._scale, self._read, self._type = config.scale, read, kind
 
-    def value(self, plant: DrivePlant) -> Value:
+    def value(self) -> Value:
         """Return the instrument's present value."""
-        found = self._signal(plant)
-        return found if self._scale is None else self._scale.counts_of(found)[0]
+        found = self._read()
+        if self._scale is not None:
+            return self._scale.counts_of(found)[0]
+        if self._type is DataType.REAL:
+            return found
+        return found != 0.0 if self._type is DataType.BOOLEAN else int(found)
 
 
 class _Round:
     def __init__(
         self,
-        plant: DrivePlant,
+        advance: Callable[[int], None],
         feeds: Sequence[_Feed],
         inputs: ProcessInputs,
         operations: Operations,
         observers: Observers,
     ) -> None:
-        self._plant, self._feeds, self._inputs = plant, feeds, inputs
+        self._advance, self._feeds, self._inputs = advance, feeds, inputs
         self._memory, self._operations, self._observers = inputs.memory, operations, observers
 
     def write(self, now_ns: int, _: int) -> None:
         """Write the instruments' present values that differ from memory."""
-        plant, memory = self._plant, self._memory
-        plant.advance(now_ns)
+        memory = self._memory
+        self._advance(now_ns)
         if not self._operations.powered:
             return
         memory.now_ns = now_ns
         for feed in self._feeds:
             view, element = feed.view, feed.element
-            value = memory.accepted(view, feed.value(plant), element)
+            value = memory.accepted(view, feed.value(), element)
             if memory.read_now(view, element) != value:
                 self._inputs.write(view, element, value, feed.writer)
         self._observers.report_writes()
@@ -73,17 +83,18 @@ class PlantFeeds:
     def __init__(
         self,
         config: RackConfig,
-        plants: Mapping[str, DrivePlant],
+        plants: RackPlants,
         memory: CommonMemory,
         inputs: ProcessInputs,
         scheduler: Scheduler,
     ) -> None:
-        """Create the feeds of these plants; nothing is scheduled yet."""
+        """Create the feeds of these plants and webs; nothing is scheduled yet."""
         self._plants, self._inputs, self._scheduler = plants, inputs, scheduler
         writers = {item.name: item.id for item in writers_of(config) if item.kind is WriterKind.PLANT}
         self._groups: dict[tuple[str, int], list[_Feed]] = {}
-        for item in (feed for feed in config.feeds if feed.plant in plants):
-            feed = _Feed(item, memory.view(item.common), writers[item.plant])
+        for item in (feed for feed in config.feeds if feed.plant in plants or feed.plant in plants.webs):
+            read, kind = plants.reader(item.plant, item.signal), config.by_name[item.common].type
+            feed = _Feed(item, read, kind, memory.view(item.common), writers[item.plant])
             self._groups.setdefault((item.plant, item.every_ns), []).append(feed)
 
     def begin(self, operations: Operations, observers: Observers) -> None:
@@ -91,20 +102,122 @@ class PlantFeeds:
         scheduler = self._scheduler
         for (name, every_ns), feeds in self._groups.items():
             key = EventKey(EventClass.IO, _AFTER_MODULES, f"{name} {every_ns:014}")
-            act = _Round(self._plants[name], feeds, self._inputs, operations, observers).write
+            act = _Round(self._plants.named(name).advance, feeds, self._inputs, operations, observers).write
             scheduler.every(every_ns, -(-scheduler.now_ns // every_ns) * every_ns, key, act)
 
 
-class RackPlants(dict[str, DrivePlant]):
-    """The plants with a motor, by name. They continue whether or not the rack has power."""
+SURFACE = ".surface"
+WEB = "web "
+"""What follows the plant's name, and goes before the web's, in the names of their states."""
 
-    def __init__(self, configs: Sequence[PlantConfig]) -> None:
+_STOCK, _HUNG = ("wound_m", "web_m", "turns"), ("m", "broken", "x_m")
+"""What stays of a roll or roller, and of a web, while everything rests."""
+
+_MOST_M = 1e12
+"""Longest web of a kept state, m (decision: a bound on what a damaged file says)."""
+
+
+def _is_possible(part: WebEnd | WebSpan, key: str, value: object) -> bool:
+    if key == "broken" or isinstance(value, bool):
+        return key == "broken" and isinstance(value, bool)
+    if not isinstance(value, int | float):
+        return False
+    least, most = -_MOST_M, _MOST_M
+    if isinstance(part, WebSpan):
+        least = 1e-6 if key == "m" else -part.stop_m
+        most = _MOST_M if key == "m" else part.stop_m
+    elif key == "wound_m":
+        least, most = 0.0, 0.0 if part.roll is None else part.roll.wound_m(MOST_DIAMETER_M)
+    return least <= value <= most
+
+
+class _Kept(Protocol):
+    def state(self) -> SavedState: ...
+
+    def restore(self, state: SavedState) -> None: ...
+
+
+class RackPlants(dict[str, DrivePlant]):
+    """The plants with a motor, by name. They continue whether or not the rack has power.
+
+    Attributes:
+        ends: the rolls and rollers by the names of their plants.
+        webs: the webs by their own.
+        found: what ``restock`` has put back at the start, {} where all began as installed.
+    """
+
+    def __init__(self, configs: Sequence[PlantConfig], webs: Sequence[WebConfig] = ()) -> None:
+        """Create them at rest.
+
+        Raises:
+            ParameterError: the webs cannot hang so.
+        """
         super().__init__(build_plants(configs))
-        self._parts: dict[str, DrivePlant | CoupledPlants] = {**self, **couple_plants(self, configs)}
+        couplings = couple_plants(self, configs)
+        line = build_line(self, configs, webs, couplings)
+        self.ends: dict[str, WebEnd] = line.ends
+        self.webs: dict[str, WebSpan] = line.spans
+        self.found: dict[str, SavedState] = {}
+        self._parts: dict[str, _Kept] = {**self, **couplings}
+        self._parts |= {f"{name}{SURFACE}": end for name, end in self.ends.items()}
+        self._parts |= {f"{WEB}{name}": span for name, span in self.webs.items()}
+
+    def named(self, name: str) -> DrivePlant | WebSpan:
+        """Return the plant or web of a name; KeyError if there is neither."""
+        return self.webs[name] if name in self.webs else self[name]
+
+    def reader(self, name: str, signal: str) -> Callable[[], float]:
+        """Return what reads a signal of a plant, of its roll or roller, or of a web, at its present.
+
+        Raises:
+            KeyError: there is no such plant or web, or it has no such instantaneous signal.
+        """
+        if name in self.webs:
+            return partial(WEB_SIGNALS[signal], self.webs[name])
+        if signal in END_SIGNALS:
+            return partial(END_SIGNALS[signal], self.ends[name])
+        return partial(SIGNALS[signal], self[name])
 
     def state(self) -> dict[str, SavedState]:
-        """Return the whole state, by plant; that of a coupling by the names of both plants."""
+        """Return the whole state, by plant: that of a coupling by the names of both plants, ``UNWIND+WINDER``.
+
+        That of a roll or roller is ``UNWIND.surface``, that of a web ``web W1``.
+        """
         return {name: part.state() for name, part in self._parts.items()}
+
+    def stock(self) -> dict[str, SavedState]:
+        """Return what stays while everything rests: web on rolls, counters, webs with their dancers.
+
+        The speeds of shafts do not stay, nor do faults and other stiffnesses (decision: as those of plants).
+        """
+        found: dict[str, SavedState] = {}
+        for names, parts in ((_STOCK, self.ends), (_HUNG, self.webs)):
+            for name, part in parts.items():
+                state, given = part.state(), repr(part.data)
+                found[name] = {"of": given, **{key: state[key] for key in names}}
+        return found
+
+    def restock(self, stock: Mapping[str, SavedState]) -> list[str]:
+        """Put back what ``stock`` returned, at the start; return the plants and webs whose data are others now.
+
+        Raises:
+            ValueError: a number of it is impossible.
+        """
+        edited = []
+        for names, parts in ((_STOCK, self.ends), (_HUNG, self.webs)):
+            for name, part in parts.items():
+                kept = stock.get(name)
+                if kept is None:
+                    continue
+                if kept["of"] != repr(part.data):
+                    edited.append(name)
+                    continue
+                values = {key: kept[key] for key in names}
+                if not all(_is_possible(part, key, value) for key, value in values.items()):
+                    raise ValueError(f"what was kept of {name} is impossible")
+                part.restore({**part.state(), **values})
+                self.found[name] = {"of": kept["of"], **values}
+        return edited
 
     def load(self, state: Mapping[str, SavedState]) -> None:
         """Restore a state; ValueError if it is not that of these plants."""

@@ -161,7 +161,7 @@ class Rack:
         self._interrupts = Interrupts(self.memory, self.events)
         self.inputs = ProcessInputs(self.memory, self.scheduler)
         self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
-        self.plants = RackPlants(self.part.plants)
+        self.plants = RackPlants(self.part.plants, self.part.webs)
         self.sampling = PlantSampling(self.plants, self.scheduler)
         self._feeds = PlantFeeds(config, self.plants, self.memory, self.inputs, self.scheduler)
         services = RackServices(

@@ -38,11 +38,15 @@ from automax_ros.rackfile.sections.commons import SCHEMA as COMMON_SCHEMA
 from automax_ros.rackfile.sections.commons import CommonReader
 from automax_ros.rackfile.sections.feeds import read_feeds
 from automax_ros.rackfile.sections.joints import read_commands
+from automax_ros.rackfile.sections.meant_so import SCHEMA as MEANT_SO_SCHEMA
+from automax_ros.rackfile.sections.meant_so import read_meant_so
 from automax_ros.rackfile.sections.plants import SCHEMA as PLANTS_SCHEMA
 from automax_ros.rackfile.sections.plants import Plants, read_plants
 from automax_ros.rackfile.sections.tasks import TaskReader
+from automax_ros.rackfile.sections.watch import ALARMS_SCHEMA, read_alarms, read_watch
 from automax_ros.rackfile.sections.watch import SCHEMA as WATCH_SCHEMA
-from automax_ros.rackfile.sections.watch import read_watch
+from automax_ros.rackfile.sections.webs import SCHEMA as WEBS_SCHEMA
+from automax_ros.rackfile.sections.webs import read_webs
 
 _SLOT = re.compile(r"[0-9]{1,3}\Z")
 SLOTS_SCHEMA: Schema = entries(
@@ -189,8 +193,11 @@ KEYS: Keys = {
     **schemas(_NAME, _OPERATOR, _EXECUTION, EXECUTIVE, _AUTO_RUN, _MODULE_LOSS),
     "slots": SLOTS_SCHEMA,
     "plants": PLANTS_SCHEMA,
+    "webs": WEBS_SCHEMA,
     "common": COMMON_SCHEMA,
     "watch": WATCH_SCHEMA,
+    "alarms": ALARMS_SCHEMA,
+    "meant_so": MEANT_SO_SCHEMA,
 }
 """The top-level keys of a rack file."""
 _REQUIRED = ("rack", "slots")
@@ -278,16 +285,21 @@ def _read_rack(root: Node, text: str, tasks: TaskReader, path: Path, findings: P
     execution = section.read(_EXECUTION) or Timing.IDEAL
     executive = section.read(EXECUTIVE) or NEWEST
     plants = read_plants(section.get("plants"), findings)
+    webs = read_webs(section.get("webs"), plants.known, findings)
     slots, common, watch = section.get("slots"), section.get("common"), section.get("watch")
     reader = SlotReader(tasks, findings, executive, plants)
     modules = reader.read(slots, section.key_span("slots")) if slots is not None else ()
     variables = CommonReader(modules, findings, reader.unread).read(common) if common is not None else ()
     if common is not None:
         _check_size(variables, modules, section.key_span("common"), findings)
-    feeds = read_feeds(plants.feeds, variables, modules, findings)
+    feeds = read_feeds([*plants.feeds, *webs.feeds], variables, modules, findings)
     commands = read_commands(plants.joints, variables, findings)
     everything = (*variables, *_bank_variables(modules))
     shown = read_watch(watch, everything, findings) if watch is not None else None
+    alarms = section.get("alarms")
+    named_alarms = read_alarms(alarms, everything, findings) if alarms is not None else ()
+    intended = section.get("meant_so")
+    meant_so = read_meant_so(intended, variables, plants.known, modules, findings) if intended is not None else {}
     if name is None or findings.errors:
         return None
     return RackConfig(
@@ -303,9 +315,12 @@ def _read_rack(root: Node, text: str, tasks: TaskReader, path: Path, findings: P
         auto_run=auto_run,
         on_module_loss=loss,
         plants=tuple(plants.known.values()),
+        webs=tuple(webs.known.values()),
         feeds=feeds,
         joint_commands=commands,
         watch=shown,
+        alarms=named_alarms,
+        meant_so=meant_so,
     )
 
 

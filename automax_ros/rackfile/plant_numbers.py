@@ -1,4 +1,4 @@
-"""The numbers of a plant by dotted path, from their keys in the rack file: ``UNWIND.load.torque_nm``.
+"""The numbers of plants and webs by dotted path, from their keys in the rack file: ``UNWIND.load.torque_nm``.
 
 A rack with other numbers is read from another text, so that every rule of the file applies to them.
 """
@@ -16,19 +16,24 @@ from automax_ros.core.yaml_text import Node, Scalar, raise_flaw, read_yaml, yaml
 from automax_ros.core.yaml_text import YamlMapping as Keys
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.sections.plants import KEYS
+from automax_ros.rackfile.sections.webs import KEYS as WEB_KEYS
 
 _NOWHERE = Span(1, 1, 2)
 
 
 @dataclass(frozen=True)
 class PlantNumber:
-    """A number of a plant: ``keys`` lead to it, ``low`` and ``high`` are its limits."""
+    """A number of a plant, or of a web: ``keys`` lead to it, ``low`` and ``high`` are its limits.
+
+    ``section`` is the one of the rack file that has the name ``plant``.
+    """
 
     plant: str
     keys: tuple[str, ...]
     low: float
     high: float
     is_whole: bool = False
+    section: str = "plants"
 
     @property
     def label(self) -> str:
@@ -37,25 +42,27 @@ class PlantNumber:
 
 
 def plant_number(config: RackConfig, text: str) -> PlantNumber:
-    """Return the number with the path ``PLANT.key.key``; the plant's name may be in lower case.
+    """Return the number with the path ``PLANT.key.key`` or ``WEB.key``; the name may be in lower case.
 
     Raises:
-        UserError: there is no such plant, or its section has no such number.
+        UserError: there is no such plant or web, or its section has no such number.
     """
     owner, _, path = "".join(text.split()).partition(".")
-    plants = {plant.name: plant for plant in config.plants}
+    webs = {web.name for web in config.webs}
+    owners = [*(plant.name for plant in config.plants), *(web.name for web in config.webs)]
     name = owner.upper()
-    if name not in plants:
-        raise UserError(f"the rack has no plant {quoted(owner)}", near_or_listed(name, plants))
-    known = {".".join(keys): (keys, schema) for keys, schema in _numbers({"properties": KEYS}, ())}
+    if name not in owners:
+        raise UserError(f"the rack has no plant {quoted(owner)}", near_or_listed(name, owners))
+    section, word, own = ("webs", "web", WEB_KEYS) if name in webs else ("plants", "plant", KEYS)
+    known = {".".join(keys): (keys, schema) for keys, schema in _numbers({"properties": own}, ())}
     if path not in known:
-        raise UserError(f"plant {name} has no number {quoted(path)}", near_or_listed(path, known, f"{name}."))
+        raise UserError(f"{word} {name} has no number {quoted(path)}", near_or_listed(path, known, f"{name}."))
     keys, schema = known[path]
-    return PlantNumber(name, keys, schema["minimum"], schema["maximum"], schema["type"] == "integer")
+    return PlantNumber(name, keys, schema["minimum"], schema["maximum"], schema["type"] == "integer", section)
 
 
 def with_numbers(text: str, values: Mapping[PlantNumber, str]) -> str:
-    """Return a rack file's text with other numbers of plants, the text itself without any.
+    """Return a rack file's text with other numbers of plants and webs, the text itself without any.
 
     Missing keys on the way to them are added; a motor given by its name has no numbers.
 
@@ -67,7 +74,7 @@ def with_numbers(text: str, values: Mapping[PlantNumber, str]) -> str:
     root = read_yaml(text, raise_flaw)
     assert isinstance(root, Keys)
     for number, value in values.items():
-        root = _with(root, ("plants", number.plant, *number.keys), value, number.label)
+        root = _with(root, (number.section, number.plant, *number.keys), value, number.label)
     return yaml_of(root)
 
 

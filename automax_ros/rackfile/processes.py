@@ -6,7 +6,7 @@ one:
 
 - a Processor, the 57C406 whose gates one of its tasks fires, and the drive digital I/O module of that drive (52.1.1);
 - a 57C405 and the 57C406 whose armature voltage is wired to it (52.6.1);
-- modules whose plants are coupled: two shafts are one mechanical system;
+- modules whose plants are joined by couplings or webs, other plants between them too: they are one mechanical system;
 - a module that interrupts and the Processors with an EVENT for that interrupt (J-3675 p. 6-17);
 - the modules of tasks that declare one software event, or that open one channel (J-3675 p. 6-17, 6-20).
 
@@ -28,6 +28,7 @@ from automax_ros.core.user_error import UserError
 from automax_ros.language.program import Program
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.model.config import RackConfig, driven_plants
+from automax_ros.rackfile.model.webs import joined_plants
 
 MEMORY_PROCESS = "common_memory"
 """Name of the process with common memory, as that of its node, also if a lone Processor holds the commons."""
@@ -104,13 +105,24 @@ def _bonds(config: RackConfig, programs: Sequence[Program]) -> Iterator[_Bond]:
     for module in config.modules:
         if module.drive is not None and module.drive in names:
             yield _Bond((module.slot, module.drive), f"{module.name} has the armature voltage of {names[module.drive]}")
-    turned = {driven.name: driven for driven in driven_plants(config)}
-    for driven in turned.values():
-        couple = driven.config.couple
-        other = turned.get(couple.to) if couple is not None else None
-        if other is not None:
-            yield _Bond((driven.slot, other.slot), f"the shafts of {driven.name} and {other.name} are coupled")
+    yield from _plant_bonds(config)
     yield from _exchange_bonds(programs, task_slots)
+
+
+def _plant_bonds(config: RackConfig) -> Iterator[_Bond]:
+    """Yield the modules whose plants are coupled or hold one web, then those with other plants between theirs."""
+    slots = {driven.name: driven.slot for driven in driven_plants(config)}
+    for plant in config.plants:
+        other = plant.couple.to if plant.couple is not None else ""
+        if plant.name in slots and other in slots:
+            yield _Bond((slots[plant.name], slots[other]), f"the shafts of {plant.name} and {other} are coupled")
+    for web in config.webs:
+        if web.start in slots and web.end in slots:
+            yield _Bond((slots[web.start], slots[web.end]), f"the web {web.name} runs from {web.start} to {web.end}")
+    for chain in dict.fromkeys(joined_plants(config.plants, config.webs).values()):
+        driven = [plant.name for plant in config.plants if plant.name in chain and plant.name in slots]
+        if len(driven) > 1 and len(driven) < len(chain):
+            yield _Bond(tuple(slots[name] for name in driven), f"{' and '.join(driven)} hang together by other plants")
 
 
 def _task_bonds(program: Program, slot: int, names: dict[int, str], config: RackConfig) -> Iterator[_Bond]:

@@ -11,6 +11,7 @@ among others). With a separate thread, scans are not delayed by a long message, 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
@@ -58,7 +59,8 @@ class LiveRack:
             RosUnavailable: ROS cannot be initialised, or refuses a node, a topic or a service.
         """
         self.rack = rack
-        self.stopping = False
+        self.stopping = self._finished = False
+        self._rest = ExitStack()
         self._process = RosProcess(arguments) if process is None else process
         self._owns_process = process is None
         self._executor, context = self._process.executor, self._process.context
@@ -94,9 +96,17 @@ class LiveRack:
         """Run the rack until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""
         self.nodes.run(duration_ns, on_idle, lambda: self.stopping)
 
+    def finish(self) -> None:
+        """Stop the tasks, and publish the last messages; the nodes serve nothing after that. Again, it does nothing."""
+        if not self._finished:
+            self._finished = True
+            self._rest.enter_context(self._process.resting())
+            self.nodes.finish()
+
     def close(self) -> None:
-        """Stop the tasks, publish the last messages, destroy the nodes, and shut ROS down unless the caller does."""
-        with self._process.resting():
+        """Finish, destroy the nodes, and shut ROS down unless the caller does."""
+        with self._rest:
+            self.finish()
             self.nodes.close(spun=False)
         self._leave()
 

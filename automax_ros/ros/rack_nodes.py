@@ -156,7 +156,7 @@ class RackNodes:
             lock=turns,
             is_recorded=process_layout is not None and process_layout.awaits_recorder,
         )
-        self._begun = self._closed = False
+        self._begun = self._finished = self._closed = False
         self._thread: threading.Thread | None = None
         self.nodes = nodes_of(self._rack_context)
         self._own: tuple[RackNode, ...] = ()
@@ -315,15 +315,11 @@ class RackNodes:
         self._begin()
         self._pacer.run(until_ns, on_idle, should_stop)
 
-    def close(self, *, spun: bool = True) -> None:
-        """Stop the tasks, publish the last messages, and leave the graph; a second call does nothing.
-
-        Args:
-            spun: whether a thread may be spinning the executor, which must then release the nodes first.
-        """
-        if self._closed:
+    def finish(self) -> None:
+        """Stop the tasks, and publish the last messages; a second call does nothing."""
+        if self._finished:
             return
-        self._closed = True
+        self._finished = True
         if self._thread is not None:
             self._thread.join()
         self._intake.stop()
@@ -335,6 +331,17 @@ class RackNodes:
                 self._send_last()
         if self._begun:
             self._deliver()
+
+    def close(self, *, spun: bool = True) -> None:
+        """Finish, and leave the graph; a second call does nothing.
+
+        Args:
+            spun: whether a thread may be spinning the executor, which must then release the nodes first.
+        """
+        if self._closed:
+            return
+        self.finish()
+        self._closed = True
         if self._desk is not None:
             self._desk.close()
         nodes = (*self.nodes, *self._own)
@@ -378,9 +385,9 @@ class RackNodes:
 
     def _keep_pace(self) -> None:
         try:
-            self._clock.wait(lambda: self._closed)
+            self._clock.wait(lambda: self._finished)
             self._begin()
-            while not self._closed:
+            while not self._finished:
                 with self._rack_context.lock.for_scan:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)

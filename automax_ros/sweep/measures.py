@@ -1,6 +1,7 @@
 """Measures as text: ``rms(SPEED_ERR%) settle(SPEED%, 2 %) max(CUR%, from=1.0 to=3.0)``.
 
-A list of calls, with blanks or commas between them; only numbers are evaluated.
+A list of calls, with blanks or commas between them; only numbers are evaluated. Signals of webs, rolls and rollers
+can be measured too: ``max(W1/tension_n)``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from automax_ros.core.ticks import exact_ns, seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.user_error import UserError
 from automax_ros.core.values import number
+from automax_ros.drive.web.signals import END_KINDS, WEB_KINDS
 from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.rack_names import RackNames, SignalName
 from automax_ros.sweep import functions
 from automax_ros.sweep.functions import Accumulator
 
@@ -23,6 +26,8 @@ MOST_MEASURES = 50
 """Most measures of one sweep (decision)."""
 MOST_CHARACTERS = 4000
 """Longest text of measures (decision: it is read as a whole)."""
+MEASURED = {**END_KINDS, **WEB_KINDS}
+"""The signals that can be measured, with their types: those of webs, rolls and rollers."""
 _CALL = re.compile(r"[\s,]*([A-Za-z_]{1,40})[ \t]*(\()?")
 _TIMES = re.compile(r"[\s,]*\b(from|to)\s*=\s*([^\s,()]*)")
 
@@ -76,7 +81,7 @@ FUNCTIONS: Mapping[str, Function] = {
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure; ``subject`` is a common with its subscripts, a task, or "".
+    """A measure; ``subject`` is a common with its subscripts, a signal such as ``W1/tension_n``, a task, or "".
 
     ``numbers`` follow the subject, the first of them in % with ``percent``. The window is from ``start_ns`` to
     ``end_ns``, the run's end if that is None.
@@ -102,8 +107,8 @@ class Measure:
         return f"{self.function}({', '.join(parts)})"
 
     @property
-    def is_of_common(self) -> bool:
-        """Whether it watches a common."""
+    def is_watched(self) -> bool:
+        """Whether it watches a common or a signal, over the run."""
         return FUNCTIONS[self.function].subject in (Subject.NUMBER, Subject.BOOLEAN)
 
     def accumulator(self) -> Accumulator:
@@ -211,8 +216,22 @@ def _subject(function: Function, name: str, text: str, config: RackConfig) -> st
         if text.upper() not in tasks:
             raise UserError(f"the rack has no task {quoted(text)}", near_or_listed(text.upper(), tasks))
         return text.upper()
+    if "/" in text:
+        return _signal(function, name, text, config)
     meant = config.common(text)
     kind = meant.variable.type
+    if not (kind is DataType.BOOLEAN if function.subject is Subject.BOOLEAN else kind.is_numeric):
+        raise UserError(f"{name} is of {function.subject.value}; {meant.label} is a {kind.word}")
+    return meant.label
+
+
+def _signal(function: Function, name: str, text: str, config: RackConfig) -> str:
+    meant = RackNames(config, ()).find(text)
+    assert isinstance(meant, SignalName)
+    if meant.signal not in MEASURED:
+        hint = f"feed it into a common and measure that; signals that can be measured are {', '.join(MEASURED)}"
+        raise UserError(f"{meant.label} cannot be measured itself", hint)
+    kind = MEASURED[meant.signal]
     if not (kind is DataType.BOOLEAN if function.subject is Subject.BOOLEAN else kind.is_numeric):
         raise UserError(f"{name} is of {function.subject.value}; {meant.label} is a {kind.word}")
     return meant.label

@@ -1,4 +1,4 @@
-"""Quantities that vary from run to run, by name: tunables of tasks, commons before RUN, numbers of plants."""
+"""Quantities that vary from run to run, by name: tunables of tasks, commons before RUN, numbers of plants and webs."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def variable_named(rack: Rack, text: str) -> VariedVariable:
         return _common(rack, text)
     owner = owner.strip().upper()
     tasks = {task.name for task in rack.tasks}
-    plants = {plant.name for plant in rack.config.plants}
+    plants = {plant.name for plant in rack.config.plants} | {web.name for web in rack.config.webs}
     if owner in tasks and (owner not in plants or _is_tunable(rack, owner, name)):
         return _tunable(rack, owner, name)
     if owner in plants:

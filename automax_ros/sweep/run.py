@@ -173,7 +173,7 @@ def _run(
     stopped = rack.operations.stopped
     fault = stopped.reason if stopped is not None and stopped.is_fault else ""
     values = watch.results(plan.duration_ns) if not fault else {}
-    values.update((item, _of_rack(rack, item)) for item in plan.measures if not item.is_of_common)
+    values.update((item, _of_rack(rack, item)) for item in plan.measures if not item.is_watched)
     refused = next((line for line in stimulation.news()), "")
     return RunOutcome(tuple(values.get(item) for item in plan.measures), fault or refused)
 

@@ -1,8 +1,8 @@
-"""Watches the commons of measures during a run: each change in the write log."""
+"""Watches what is measured during a run: commons by each change in the write log, signals at the rack's samples."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from automax_ros.core.types import Value
@@ -42,7 +42,7 @@ class _Window:
 
 @dataclass
 class _Signal:
-    """A common or an element with the windows on it; ``value`` holds since ``since_ns``."""
+    """A common, an element or a signal with the windows on it; ``value`` holds since ``since_ns``."""
 
     value: float
     since_ns: int
@@ -69,16 +69,21 @@ class Watch:
         self._signals: dict[int, dict[int, _Signal]] = {}
         """By element, then by view: most writes are of simple commons that are not watched."""
         self._windows: dict[Measure, _Window] = {}
+        self._sampled: dict[str, tuple[Callable[[], float], _Signal]] = {}
         for measure in measures:
-            if measure.is_of_common:
+            if measure.is_watched:
                 self._add(rack, measure, end_ns)
         rack.observers.add(self)
+        if self._sampled:
+            rack.sampling.observe(self._sample)
 
     def results(self, end_ns: int) -> dict[Measure, float | None]:
-        """Return the results of the measures of commons."""
+        """Return the results of the measures of commons and signals."""
         for signals in self._signals.values():
             for signal in signals.values():
                 signal.flush(end_ns)
+        for _, signal in self._sampled.values():
+            signal.flush(end_ns)
         return {measure: window.result() for measure, window in self._windows.items()}
 
     def written(self, writes: list[WriteGroup]) -> None:
@@ -102,13 +107,28 @@ class Watch:
     def operated(self, operation: Operation) -> None:
         """Ignore operations."""
 
+    def _sample(self, now_ns: int) -> None:
+        for read, signal in self._sampled.values():
+            signal.change(now_ns, read())
+
     def _add(self, rack: Rack, measure: Measure, end_ns: int) -> None:
+        signal = self._sampled_signal(rack, measure.subject) if "/" in measure.subject else self._common(rack, measure)
+        end = end_ns if measure.end_ns is None else measure.end_ns
+        window = _Window(measure.accumulator(), measure.start_ns, end, signal.value)
+        signal.windows.append(window)
+        self._windows[measure] = window
+
+    def _common(self, rack: Rack, measure: Measure) -> _Signal:
         meant = rack.config.common(measure.subject)
         view = rack.memory.view(meant.name)
         present = rack.memory.read_now(view, meant.index)
         assert not isinstance(present, str)
-        end = end_ns if measure.end_ns is None else measure.end_ns
-        window = _Window(measure.accumulator(), measure.start_ns, end, present)
-        signals = self._signals.setdefault(meant.index, {})
-        signals.setdefault(view, _Signal(present, rack.now_ns)).windows.append(window)
-        self._windows[measure] = window
+        return self._signals.setdefault(meant.index, {}).setdefault(view, _Signal(present, rack.now_ns))
+
+    def _sampled_signal(self, rack: Rack, subject: str) -> _Signal:
+        """Return a signal of a plant or web, which holds from sample to sample (decision)."""
+        if subject not in self._sampled:
+            owner, _, name = subject.partition("/")
+            read = rack.plants.reader(owner, name)
+            self._sampled[subject] = read, _Signal(read(), rack.now_ns)
+        return self._sampled[subject][1]

@@ -87,7 +87,7 @@ def test_interrupt_ends_silently(automax, monkeypatch):
     assert automax("blocks") == (INTERRUPTED, "", "")
 
 
-@pytest.mark.parametrize("name", ["run", "node", "record", "play"])
+@pytest.mark.parametrize("name", ["run", "node", "record", "play", "panel"])
 def test_ctrl_c_before_a_command_takes_signals_is_the_end_of_what_runs_until_it_is_stopped(automax, monkeypatch, name):
     def interrupted(arguments):
         raise KeyboardInterrupt

@@ -18,6 +18,7 @@ COMMANDS = {
     "export": ["export", "bag", "-o", "out.csv"],
     "plot": ["plot", "bag", "SPEED_FDBK%", "-o", "out.png"],
     "report": ["report", "bag", "-o", "out.html"],
+    "compare": ["compare", "bag", "bag"],
 }
 
 

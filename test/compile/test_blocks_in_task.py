@@ -254,7 +254,7 @@ def type_of(value: object) -> object:
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
 @given(data=st.data())
-@repeatable(40)
+@repeatable(20)
 def test_a_compiled_block_is_its_step_function(block, data):
     programmed = data.draw(with_its_structure(block))
     compare(programmed, data.draw(scans(used(programmed), 5)), data.draw(st.booleans()))

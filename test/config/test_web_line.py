@@ -256,7 +256,7 @@ def recorded_in_parts(folder: Path, seconds: float, parts: int) -> tuple[dict[st
     return digest(folder), sizes
 
 
-@pytest.mark.parametrize("seconds", [10, in_soak(3600, timeout_s=3600)])
+@pytest.mark.parametrize("seconds", [6, in_soak(3600, timeout_s=3600)])
 def test_a_run_twice_in_flat_memory(tmp_path, seconds) -> None:
     first, sizes = recorded_in_parts(tmp_path / "one", seconds, 12)
     assert recorded_in_parts(tmp_path / "two", seconds, 1)[0] == first

@@ -18,6 +18,7 @@ from automax_ros.cli.main import main
 from docs.fences import ROOT, Fence, fences
 
 STAGES = {
+    "docs/howto/import.md": "import",
     "docs/old_files.md": "old_files",
     "docs/rack_yaml.md": "tasks",
     "docs/recordings.md": "pm1",

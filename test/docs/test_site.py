@@ -126,7 +126,7 @@ def test_the_pictures_are_of_the_racks_as_they_are():
 def test_the_pictures_of_report_and_plot_are_made_again(tmp_path):
     """Where another matplotlib draws other bytes, the size is the same."""
     tool("docs_pictures").make(tmp_path)
-    for name in ("report.png", "plot.png"):
+    for name in ("report.png", "line_report.png", "plot.png", "compare.png"):
         made, committed = (folder.joinpath(name).read_bytes() for folder in (tmp_path, ROOT / "docs" / "pictures"))
         assert made[16:24] == committed[16:24]
 

@@ -44,7 +44,8 @@ common:
 
 
 OPERATION = {"execution", "executive", "auto_run", "on_module_loss", "critical"}
-PLANT = ("plant", "drive", "line", "load", "inertia", "couple", "feeds", "joint")
+PLANT = ("plant", "drive", "line", "load", "inertia", "couple", "feeds", "joint", "gear", "roll", "roller")
+WEB = ("webs", "length_m", "stiffness_n", "modulus_mpa", "threaded", "breaks_above_n", "dancer")
 NETWORK = {"network", "drop", "depth"}
 UDC = {"drive", "plants", "motor", "motor_overload_ratio"}
 """Keys of UDC modules and what they drive; ``modules/test_udc_rules.py`` tries them."""
@@ -151,8 +152,10 @@ def test_the_module_decides_how_many_registers_there_are(tmp_path):
 def test_every_documented_key_is_tried():
     """Some do nothing yet, and the page says so.
 
-    What to watch is tried in ``test_settings.py``, those of operation in ``test_executive.py``, a UDC's and a network
-    module's with it, a plant's in ``plants``.
+    What to watch is tried in ``test_settings.py``, alarms in ``sections/test_alarms.py``, what is meant so in
+    ``checks/test_omissions.py``, those of operation in
+    ``test_executive.py``, a UDC's and a network module's with it, a plant's in ``plants``, a web's in
+    ``sections/test_webs.py``.
     """
     text = PAGE.read_text(encoding="utf-8")
     tables = re.findall(r"^\| (?:key|option) \| value .*\n\| --- .*\n((?:\|.*\n)+)", text, re.M)
@@ -164,9 +167,12 @@ def test_every_documented_key_is_tried():
         *UDC,
         *NETWORK,
         *PLANT,
+        *WEB,
         "module",
         "operator",
         "watch",
+        "alarms",
+        "meant_so",
         "slot",
         "register",
         "bit",

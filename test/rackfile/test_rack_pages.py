@@ -15,7 +15,7 @@ from automax_ros.rackfile.reading.files import MAX_BYTES
 PAGES = Path(automax_ros.core.__file__).parent / "pages"
 TOO_LONG = ("AMX6481",)
 """Problems whose examples would not fit on a page."""
-FORGOTTEN = ("AMX6496", "AMX6497", "AMX6498")
+FORGOTTEN = ("AMX6224", "AMX6496", "AMX6497", "AMX6498", "AMX6499")
 """What `automax check` says of a rack as a whole; short examples of other problems leave out much."""
 CODES = [
     code

@@ -32,7 +32,7 @@ def rack(tmp_path):
 
 
 def test_examples_are_stimuli(rack, tmp_path):
-    (text,) = blocks("yaml")
+    text = blocks("yaml")[0]
     file = read(rack, tmp_path, text)
     assert file.diagnostics == []
     verbs = {entry.verb for entry in file.stimuli or ()}
@@ -44,6 +44,16 @@ def test_the_example_runs(rack, tmp_path):
     rack.run(21.0)
     assert [(item.what, item.ok) for item in stimulation.happened if not item.ok] == []
     assert rack.value("REF%") == 0, "power has gone"
+
+
+def test_the_table_of_the_page_is_played(rack, tmp_path):
+    (tmp_path / "shift.csv").write_text(blocks("csv")[0])
+    stimulation = playing(rack, tmp_path, blocks("yaml")[1])
+    rack.run(4.0)
+    assert (rack.value("REF%"), rack.value("RUN@")) == (1567, True), "in a line from 1500 at 3 s to 1600 at 4.5 s"
+    rack.run(2.1)
+    assert (rack.value("REF%"), rack.value("RUN@"), rack.value("TACH%")) == (1600, False, 1590)
+    assert stimulation.is_over
 
 
 def test_a_report_has_the_keys_of_the_page(rack):

@@ -65,7 +65,7 @@ def test_every_function_makes_what_computes_it(config: RackConfig):
     subjects = {"errors": "(LOOP)", "stopped": "", "count": "(NEAR@)", "time": "(NEAR@)", "settle": "(ERR%, 1)"}
     for name in FUNCTIONS:
         (measure,) = read(config, f"{name}{subjects.get(name, '(ERR%)')}")
-        if measure.is_of_common:
+        if measure.is_watched:
             accumulator = measure.accumulator()
             accumulator.hold(1, 0, 5)
             accumulator.result(1, 5)

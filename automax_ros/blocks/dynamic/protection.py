@@ -215,6 +215,6 @@ THERMAL_OVERLOAD = Block(
         "Every UDC task needs this block unless hardware protects the motor.",
     ),
     expected_on=UDC_ONLY,
-    expected_since="it protects the motor, unless a hardware device does (36)",
+    expected_since="it protects the motor, unless a hardware device does",
     step=thermal_overload_step,
 )

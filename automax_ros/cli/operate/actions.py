@@ -167,20 +167,23 @@ def _add_reload_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _control(name: str, help_text: str) -> Callable[[argparse.ArgumentParser], None]:
+def _control(
+    name: str, help_text: str, value: str = "a position, a number (default: true)"
+) -> Callable[[argparse.ArgumentParser], None]:
     def add(parser: argparse.ArgumentParser) -> None:
         parser.add_argument("name", metavar=name, help=help_text)
         parser.add_argument("control", metavar="WHAT", help="as stimuli files write it")
-        parser.add_argument("value", nargs="*", metavar="VALUE", help="a position, a number (default: true)")
+        parser.add_argument("value", nargs="*", metavar="VALUE", help=value)
 
     return add
 
 
-def _move_calls(service: str) -> Callable[[argparse.Namespace], list[ServiceCall]]:
+def _move_calls(service: str, usual: str = "true") -> Callable[[argparse.Namespace], list[ServiceCall]]:
     def calls(given: argparse.Namespace) -> list[ServiceCall]:
-        value = " ".join(given.value) or "true"
+        value = " ".join(given.value) or usual
         fields = {"name": given.name, "control": given.control, "value": value}
-        return [ServiceCall(service, "automax_msgs/OperateControl", fields, f"{given.name} {given.control} {value}")]
+        of = f"{given.name} {given.control} {value}".rstrip()
+        return [ServiceCall(service, "automax_msgs/OperateControl", fields, of)]
 
     return calls
 
@@ -287,10 +290,19 @@ def _single_call(service: str, type_name: str) -> Callable[[argparse.Namespace],
 
 
 def _plant_verbs() -> str:
-    from automax_ros.drive.plant.faults import VERBS
+    from automax_ros.rack.operator.plant_verbs import PLANT_VERBS
 
-    rows = [[f"  {name}", verb.wants] for name, verb in VERBS.items()]
-    return "\n".join(["what, and its values:", *table(rows)])
+    return _verbs_text((name, verb.wants) for name, verb in PLANT_VERBS.items())
+
+
+def _web_verbs() -> str:
+    from automax_ros.rack.operator.plant_verbs import WEB_VERBS
+
+    return _verbs_text((name, verb.wants) for name, verb in WEB_VERBS.items())
+
+
+def _verbs_text(verbs: Iterable[tuple[str, str]]) -> str:
+    return "\n".join(["what, and its values:", *table([[f"  {name}", wants] for name, wants in verbs])])
 
 
 ACTIONS: Mapping[str, Action] = {
@@ -341,6 +353,12 @@ ACTIONS: Mapping[str, Action] = {
         _move_calls("plant"),
         _control("PLANT", "its name in the rack's file"),
         more=_plant_verbs,
+    ),
+    "web": Action(
+        "break, thread or change the web between two drives",
+        _move_calls("web", ""),
+        _control("WEB", "its name in the rack's file", "a number, where WHAT takes one"),
+        more=_web_verbs,
     ),
     "reload": Action(
         "replace the source of a task while the others run", _reload, _add_reload_arguments, done_text=reload_text

@@ -75,10 +75,11 @@ def is_text(result: LoadResult) -> bool:
 
 
 def size_of(rack: RackConfig) -> str:
-    """Return the numbers of modules, tasks and commons of a rack, in words."""
+    """Return the numbers of modules, tasks, commons and webs of a rack, in words."""
     modules = Counter(SUPPORTED[module.model].word for module in rack.task_modules)
     counts = [(number, f"{word[0].upper()}{word[1:]}") for word, number in modules.items()]
     counts += [(len(rack.placed_tasks), "task"), (len(rack.declared), "common")]
+    counts += [(len(rack.webs), "web")] if rack.webs else []
     return ", ".join(count_of(number, thing) for number, thing in counts)
 
 

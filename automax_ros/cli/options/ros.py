@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from automax_ros.cli.options.values import seconds_above_0
 from automax_ros.core.text import quoted
 from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.model.ros_names import namespace
@@ -15,6 +16,20 @@ from automax_ros.ros.setup.discovery import RANGES
 
 if TYPE_CHECKING:
     from automax_ros.rackfile.model.config import RackConfig
+
+
+DEFAULT_WAIT_S = "10"
+
+
+def add_wait_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--wait``: how long a rack is looked for."""
+    parser.add_argument(
+        "--wait",
+        type=seconds_above_0,
+        metavar="S",
+        default=DEFAULT_WAIT_S,
+        help=f"seconds to look for the rack (default: {DEFAULT_WAIT_S})",
+    )
 
 
 def add_ros_arguments(parser: argparse.ArgumentParser) -> None:

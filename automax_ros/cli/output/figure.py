@@ -17,7 +17,7 @@ from automax_ros.core.user_error import UsageError
 from automax_ros.recordings.tables.traces import ErrorMark, Line, TraceRole, Traces, thinned
 
 DPI = 120
-_LINE_STYLES = ("-", "--", ":", "-.")
+_LINE_STYLES: tuple[Any, ...] = ("-", "--", (0, (2, 1)), "-.")
 _LOGIC_COLOUR, _ERROR_COLOUR = "#1f4e9c", "#c1272d"
 _ANALOG_IN, _ROW_IN, _HEAD_IN = 2.2, 0.32, 1.1
 """Heights in inches: of an analog lane, of a row of logic or errors, of title and time axis together."""
@@ -26,10 +26,11 @@ _ROW_FILL = 0.7
 _THICKEST = 1.9
 """Each line is thinner than the one before, and later ones have gaps, so that a covered line remains visible."""
 _ROLES: dict[TraceRole, dict[str, Any]] = {
+    TraceRole.BACKGROUND: {"color": "#8d9aa1", "linewidth": 0.8, "linestyle": "-", "zorder": 1.9},
     TraceRole.PLANT: {"color": "#b4bfc5", "linewidth": 4.0, "linestyle": "-", "zorder": 2.0},
     TraceRole.FEEDBACK: {"color": "#1565c0", "linewidth": 1.3, "linestyle": "-", "zorder": 2.1},
     TraceRole.LAGGED: {"color": "#ef6c00", "linewidth": 1.3, "linestyle": (0, (5, 4)), "zorder": 2.2},
-    TraceRole.REFERENCE: {"color": "#000000", "linewidth": 1.3, "linestyle": (0, (1, 4)), "zorder": 2.3},
+    TraceRole.REFERENCE: {"color": "#000000", "linewidth": 1.5, "linestyle": (0, (1, 3)), "zorder": 2.3},
 }
 """Styles of lines that show the same quantity and mostly agree: the plant's wide and pale underneath, the reference in
 thin dots on top, so that each is seen where all are equal (decision)."""
@@ -169,7 +170,7 @@ def _points(line: Line, traces: Traces, width_px: int) -> tuple[list[float], lis
 
 
 def _draw_analog(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int) -> None:
-    drawn = []
+    drawn, roles = [], [line.role for line in lines]
     for number, line in enumerate(lines):
         others = {
             "linewidth": min(1.1 + 0.4 * (len(lines) - 1 - number), _THICKEST),
@@ -177,6 +178,8 @@ def _draw_analog(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int
             "linestyle": _LINE_STYLES[(number + number // 20) % len(_LINE_STYLES)],  # 40 lines look different
         }
         look = _ROLES.get(line.role, others)
+        if line.role in roles[:number]:  # a second one of its kind has a colour of its own
+            look = {**look, "color": others["color"]}
         points = _points(line, traces, width_px)
         drawn += axis.plot(*points, drawstyle="steps-post", gid=line.variable.label, **look)
     labels = [f" {plain(line.variable.label)}" for line in lines]  # a name may begin with _, which legends leave out

@@ -37,6 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="how many Processors share the tasks (default: 1)",
     )
     parser.add_argument("--tick-ms", metavar="MS", default="5.5", help="their tick (default: 5.5)")
+    parser.add_argument(
+        "--udc",
+        action="append",
+        default=[],
+        metavar="TASK",
+        help="a task that runs on a UDC, although no block of it says so; may be given again",
+    )
     parser.add_argument("--force", action="store_true", help="write over a rack file that is there")
 
 
@@ -49,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     tick_ns = tick_option(arguments.tick_ms)
     require_free(output, force=arguments.force)
     try:
-        drafted = draft(folder, output.parent, tick_ns)
+        drafted = draft(folder, output.parent, tick_ns, frozenset(name.upper() for name in arguments.udc))
         write_whole(output, drafted.text(arguments.processors).encode(), over=arguments.force)
     except DraftFault as fault:
         raise UsageError(fault.message, fault.hint) from fault

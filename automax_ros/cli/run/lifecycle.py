@@ -24,6 +24,7 @@ from automax_ros.ros.base.module_lifecycle import NOT_OPERATED
 from automax_ros.ros.nodes.rack import RackNode
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.ros.setup.discovery import range_text
+from automax_ros.ros.setup.leaving import ended_within
 from automax_ros.ros.setup.lock import InstanceLock, domain_id
 from automax_ros.ros.setup.process import RosProcess
 from automax_ros.runtime.health import Health
@@ -96,14 +97,17 @@ class LifecycleRunner:
             if session.is_over:
                 self._ended = True
 
-    def close(self) -> None:
-        """End the run and remove the node from the graph."""
-        try:
-            self._end_session()
-        finally:
-            with self._process.resting():
-                self._process.executor.remove_node(self._node)
-                self._node.destroy_node()
+    def finish(self) -> None:
+        """End the run: save, record and report what it has to."""
+        if self._session is not None:
+            self._code = self._session.finish()
+
+    def leave(self) -> None:
+        """Remove all nodes from the graph."""
+        self._leave_session()
+        with self._process.resting():
+            self._process.executor.remove_node(self._node)
+            self._node.destroy_node()
 
     # Duties
 
@@ -174,9 +178,15 @@ class LifecycleRunner:
             raise TransitionRefused(str(fault)) from fault
 
     def _end_session(self) -> None:
+        try:
+            self.finish()
+        finally:
+            self._leave_session()
+
+    def _leave_session(self) -> None:
         session, self._session = self._session, None
         if session is not None:
-            self._code = session.close()
+            session.leave()
 
     def _is_wanted(self) -> bool:
         return self._stop.requested or self._ended or bool(self._asked)
@@ -236,14 +246,19 @@ def run_managed(managed: LifecycleRun, stop: StopRequest) -> int:
     domain, plan = domain_id(), managed.plan
     process_name = None if plan is None or plan.process_plan is None else plan.process_plan.process.name
     with InstanceLock(managed.namespace, domain, process_name):
-        process = RosProcess(managed.ros)
+        process, run = RosProcess(managed.ros), None
         try:
-            return _run_managed(LifecycleRunner(managed, process, stop, domain), _waiting(managed, domain))
+            run = LifecycleRunner(managed, process, stop, domain)
+            _run_managed(run, _waiting(managed, domain))
         finally:
-            process.close()
+            with ended_within(0 if run is None else run.code):
+                if run is not None:
+                    run.leave()
+                process.close()
+        return run.code
 
 
-def _run_managed(run: LifecycleRunner, waiting: str | None) -> int:
+def _run_managed(run: LifecycleRunner, waiting: str | None) -> None:
     try:
         if waiting is None:
             run.autostart()
@@ -251,13 +266,12 @@ def _run_managed(run: LifecycleRunner, waiting: str | None) -> int:
             print(waiting, flush=True)
         run.run()
     finally:
-        run.close()
-    return run.code
+        run.finish()
 
 
 def _run_part(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     """Run a process of a distributed rack that has no common memory, and therefore no node ``rack``."""
-    process = RosProcess(plan.ros)
+    process, session, code = RosProcess(plan.ros), None, 0
     try:
         session = LiveSession(plan, process, None, stop, domain)
         process.spin(session.live.nodes.nodes[0].guard)
@@ -265,12 +279,15 @@ def _run_part(plan: RunPlan, stop: StopRequest, domain: int) -> int:
             if session.start(stop):
                 session.run(lambda: stop.requested)
         finally:
-            code = session.close()
+            code = session.finish()
         return code
     except WorkInterrupted:
         return 0
     finally:
-        process.close()
+        with ended_within(code):
+            if session is not None:
+                session.leave()
+            process.close()
 
 
 def _waiting(managed: LifecycleRun, domain: int) -> str | None:

@@ -14,6 +14,7 @@ from automax_ros.cli.options.stimuli import stimulation as stimulation_of
 from automax_ros.cli.output.signals import StopRequest
 from automax_ros.cli.run.plan import RunPlan, conclude, print_forms, report_at_end, warn
 from automax_ros.cli.run.saving import DiskSync, RecordingMonitor, SavedState
+from automax_ros.cli.run.shown import rack_shown
 from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.base.stop_cause import StopCause
@@ -36,7 +37,7 @@ _NEVER_NS = 1 << 63
 
 
 class LiveSession:
-    """One rack with its nodes: ``start`` it, ``run`` it any number of times, always ``close`` it."""
+    """One rack with its nodes: ``start`` it, ``run`` it any number of times, always ``finish`` it and ``leave``."""
 
     def __init__(
         self, plan: RunPlan, process: RosProcess, manager: RackNode | None, stop: StopRequest, domain: int
@@ -60,12 +61,13 @@ class LiveSession:
         self._state = SavedState(rack, plan.state_folder)
         self._operated = OperationLog(lambda: self._stimulation.is_acting)
         self._reported_cause: StopCause | None = None
-        self._ending = ExitStack()
+        self._ending, self._leaving = ExitStack(), ExitStack()
         try:
             self.live = LiveRack(
                 rack, plan.ros, self._process_layout(), process=process, manager=manager, simulated=plan.simulated
             )
-            self._ending.callback(self.live.close)
+            self._leaving.callback(self.live.close)
+            self._ending.callback(self.live.finish)
             begin_with(rack, plan.tunings)
             rack.observers.add(self._operated)
             self._display = StatusDisplay(
@@ -74,6 +76,7 @@ class LiveSession:
             self._recording = RecordingMonitor(self._recorder(), self._display)
         except BaseException:
             self._ending.close()
+            self.leave()
             raise
 
     @property
@@ -97,6 +100,13 @@ class LiveSession:
             self._display.message(_opening(self.plan, self.rack, self._domain))
         for text in self.live.notes:
             self._display.message(f"warning: {text}")
+        nodes = self.live.nodes
+        pace = nodes.nodes[0].rack_context.pacer
+        self._ending.enter_context(
+            rack_shown(
+                self.rack, self.plan, self.live.stream, lambda: nodes.lock, pace, self._display.message, live=True
+            )
+        )
         if not self._all_are_there(stop):
             return False
         self.has_begun = True
@@ -115,8 +125,8 @@ class LiveSession:
         self.live.stopping = False
         self.live.run(self.plan.duration_ns, on_idle)
 
-    def close(self) -> int:
-        """Stop the rack, finish its recording and save its state; return the run's exit code."""
+    def finish(self) -> int:
+        """Stop the rack, finish its recording, save its state and report; return the run's exit code."""
         report: dict[str, Any] | None = None
         try:
             if self.has_begun:
@@ -126,18 +136,21 @@ class LiveSession:
             self._ending.close()
         if self.has_begun:
             self._report_end()
-        elif self.plan.record is not None:
-            self._display.report_recording(self.plan.record, complete=not self._recording.failed)
+        self._recording.report_end(self.plan.record)
         unsaved = self._state.failed and self.plan.state is not None
         failed = self._recording.failed or unsaved or self._stimulation.refused > 0
         return conclude(self.rack, self.plan, report, failed=failed)
+
+    def leave(self) -> None:
+        """Remove the nodes from the graph: the last thing, which DDS may never end (``ended_within``)."""
+        self._leaving.close()
 
     def _report_end(self) -> None:
         self._state.end()
         for text in self._state.news():
             self._display.message(text)
         self._recording.report_failure()
-        self._display.finish(self.plan.record, complete=not self._recording.failed)
+        self._display.finish()
 
     def _recorder(self) -> Recorder | None:
         if self.plan.record is None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from automax_ros.cli.options.panel import WantedPanel
 from automax_ros.cli.options.work import print_native
 from automax_ros.cli.output.files import write_report
 from automax_ros.cli.output.screen import print_warning_count
@@ -56,7 +57,7 @@ class RunPlan:
     sources in other folders. ``ros`` are the ROS arguments of the command line. ``process_plan`` is the part of the
     rack that is run, None for all of it. ``simulated`` is the simulated time of a rack with ROS nodes, None for the
     wall clock and for a rack without nodes. ``tunings`` are the tunables set with ``--set``. ``native`` says which
-    tasks scan as machine code, ``verbose`` prints which of them do.
+    tasks scan as machine code, ``verbose`` prints which of them do. ``panel`` is the panel that shows the rack, if any.
     """
 
     config: RackConfig
@@ -75,6 +76,7 @@ class RunPlan:
     tunings: tuple[TunableSetting, ...] = ()
     native: NativeForms = IN_PYTHON
     verbose: bool = False
+    panel: WantedPanel | None = None
 
     @property
     def is_watched(self) -> bool:

@@ -3,16 +3,18 @@
 On the wall clock the rack's modules are ROS 2 nodes in this process, until Ctrl-C or for --duration seconds. With
 --simulated time passes as fast as the machine can and nothing of ROS is started: the same rack gives the same bag, byte
 for byte; with --simulated --ros the nodes are there too, and the rack sends /clock. With `--ros-args -p
-use_sim_time:=true` it follows another's /clock.
+use_sim_time:=true` it follows another's /clock. --panel shows the rack in the browser.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
+from automax_ros.cli.options.panel import add_panel_arguments, wanted_panel
 from automax_ros.cli.options.rack import (
     add_outside_argument,
     add_set_argument,
@@ -33,6 +35,7 @@ from automax_ros.cli.output.files import held_for_writing, require_different_fil
 from automax_ros.cli.output.signals import StopRequest, WorkInterrupted, stop_signals
 from automax_ros.cli.run.plan import RunPlan, conclude, print_forms, report_at_end, warn
 from automax_ros.cli.run.saving import RecordingMonitor, SavedState
+from automax_ros.cli.run.shown import rack_shown
 from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.types import bare_name
@@ -47,11 +50,14 @@ from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS
 from automax_ros.runtime.time.simulated_pacer import SimulatedTime
+from automax_ros.runtime.time.turns import Turns
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 
 SLICE_NS = 100 * NS_PER_MS
 """Rack time between two checks of signals and updates of the display."""
 _ENDLESS_NS = 1 << 62
+_LOOK_S = 0.05
+"""Longest wait while no rack runs, s."""
 _NO_END = "simulated time without an end: Ctrl-C ends the run (or give --duration S)"
 
 
@@ -73,30 +79,48 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     state = SavedState(rack, plan.state)
     begin_with(rack, plan.tunings)
     end_ns = _ENDLESS_NS if plan.duration_ns is None else plan.duration_ns
-    try:
-        if recorder is not None:
-            stream.begin()
-        if plan.duration_ns is None:
-            display.message(_NO_END)
-        rack.start([*state.settings, *plan.settings], stimulation.begin)
-        while not stop.requested and rack.now_ns < end_ns and _goes_on(rack, plan, stimulation):
-            rack.scheduler.run_until(min(rack.now_ns + SLICE_NS, end_ns))
-            for text in [*state.news(), *stimulation.news()]:
-                display.message(text)
-            display.printed()
-            display.update(rack.now_ns)
-            recording.report_failure()
-    finally:
-        if recorder is not None:
-            stream.end()
-            recorder.close()
-    state.end()
-    for text in state.news():
-        display.message(text)
-    recording.report_failure()
-    display.finish(plan.record, complete=not recording.failed)
-    failed = recording.failed or state.failed or stimulation.refused > 0
-    return conclude(rack, plan, report_at_end(rack, stimulation), failed=failed)
+    turns = Turns()
+    with rack_shown(rack, plan, stream, turns.turn, turns, display.message, live=False) as shown:
+        sends = recorder is not None or shown is not None
+        try:
+            with turns.turn():
+                if sends:
+                    stream.begin()
+                if plan.duration_ns is None:
+                    display.message(_NO_END)
+                rack.start([*state.settings, *plan.settings], stimulation.begin)
+            while not stop.requested and rack.now_ns < end_ns and _goes_on(rack, plan, stimulation):
+                if turns.halted:
+                    time.sleep(_LOOK_S)
+                    continue
+                with turns.turn():
+                    rack.scheduler.run_until(min(rack.now_ns + SLICE_NS, end_ns))
+                    for text in [*state.news(), *stimulation.news()]:
+                        display.message(text)
+                    display.printed()
+                    display.update(rack.now_ns)
+                    recording.report_failure()
+        finally:
+            with turns.turn():
+                if shown is not None:
+                    shown.over = "the run is over"
+                if sends:
+                    stream.end()
+                if recorder is not None:
+                    recorder.close()
+        state.end()
+        for text in state.news():
+            display.message(text)
+        recording.report_failure()
+        display.finish()
+        recording.report_end(plan.record)
+        failed = recording.failed or state.failed or stimulation.refused > 0
+        code = conclude(rack, plan, report_at_end(rack, stimulation), failed=failed)
+        if shown is not None and not stop.requested:
+            display.message("the panel shows how it ended, until Ctrl-C")
+            while not stop.requested:
+                time.sleep(_LOOK_S)
+    return code
 
 
 def _goes_on(rack: Rack, plan: RunPlan, stimulation: StimuliPlayer) -> bool:
@@ -155,6 +179,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
     add_set_argument(parser, tunables=True)
     add_record_arguments(parser)
+    add_panel_arguments(parser, optional=True)
     add_shared_arguments(
         parser,
         "from run to run (default on the wall clock: .automax/RACK next to the rack file; simulated: nowhere)",
@@ -197,6 +222,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--no-restart belongs to --distributed")
     if not arguments.autostart and (arguments.simulated or arguments.distributed):
         raise UsageError("--no-autostart: a lifecycle manager starts racks on the wall clock, in one process")
+    if arguments.panel and arguments.distributed:
+        raise UsageError("--panel shows a rack in one process", "join this one: automax panel RACK")
+    wanted_panel(arguments)
     check_files(arguments)
     with stop_signals() as stop, held_for_writing(arguments.report):
         if arguments.with_ros or not arguments.simulated:
@@ -281,6 +309,7 @@ def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
         tunings=tuple(tunings),
         native=native_forms(arguments, arguments.duration, wall_clock=not arguments.simulated),
         verbose=arguments.verbose,
+        panel=wanted_panel(arguments),
     )
 
 

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from automax_ros.cli.run.status import StatusDisplay
+from automax_ros.cli.run.status import NO_SCAN, StatusDisplay, recorded_size
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
@@ -48,6 +48,15 @@ class RecordingMonitor:
             self._is_reported = True
             self._display.message("recording ended, the rack goes on")
             print(self._recorder.failure, file=sys.stderr, flush=True)
+
+    def report_end(self, bag: Path | None) -> None:
+        """Report the size of the run's recording, and what it lacks; nothing without one."""
+        if self._recorder is None or bag is None:
+            return
+        rest = f", not to the end of the run; to complete the file: automax bag repair {bag}" if self.failed else ""
+        self._display.message(f"recorded {bag}: {recorded_size(bag)}{rest}")
+        if self._recorder.has_tasks and not self._recorder.scans:
+            self._display.message(NO_SCAN)
 
 
 class DiskSync:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from automax_ros.cli.output.screen import StatusLine
 from automax_ros.core.text import count_of, printable
-from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.ticks import NS_PER_S, seconds_text
 from automax_ros.core.types import Value
 from automax_ros.core.values import value_text
 from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.modules.module import Module
+from automax_ros.rack.operator.web_news import WebNews
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.runtime.health import Health
@@ -122,6 +123,7 @@ class StatusDisplay:
     """Shows a rack's progress on an output; ``live``: on the wall clock, so that loads can be measured.
 
     ``health`` counts what goes wrong in a rack on the wall clock; each kind is shown on a line when it first happens.
+    A web that parts is shown on a line too.
     """
 
     def __init__(
@@ -140,6 +142,8 @@ class StatusDisplay:
         self._last_rack_ns = 0
         self._last_scans = 0
         self._last_busy: dict[int, int] = {}
+        self._of_webs: deque[str] = deque()
+        WebNews(rack, lambda at_ns, text: self._of_webs.append(f"{text} at {seconds_text(at_ns)} s"))
 
     def update(self, now_ns: int) -> None:
         """Show news, and the progress at a rack time if it is due."""
@@ -154,23 +158,14 @@ class StatusDisplay:
             while task.printed:
                 self.message(f"{task.name}: {printable(task.printed.popleft())}")
 
-    def finish(self, bag: Path | None, *, complete: bool = True) -> None:
-        """Show the last news and the summary; ``complete`` says whether all of the run is in the recording."""
+    def finish(self) -> None:
+        """Show the last news and the summary."""
         self._show_news()
         took = None if self._live else (time.monotonic_ns() - self._screen.began_ns) / NS_PER_S
         rack = self._rack
         self._screen.summary(
             Summary(rack.now_ns / NS_PER_S, self._live, tuple(self._rows()), tuple(self._notes()), self._values(), took)
         )
-        if bag is not None:
-            self.report_recording(bag, complete=complete)
-
-    def report_recording(self, bag: Path, *, complete: bool) -> None:
-        """Show the size of the run's recording, and what it lacks."""
-        rest = "" if complete else f", not to the end of the run; to complete the file: automax bag repair {bag}"
-        self.message(f"recorded {bag}: {recorded_size(bag)}{rest}")
-        if self._rack.tasks and not any(item.scans for item in self._rack.statistics.values()):
-            self.message(NO_SCAN)
 
     def _rows(self) -> Iterator[str]:
         for task in self._rack.tasks:
@@ -192,6 +187,8 @@ class StatusDisplay:
     def _show_news(self) -> None:
         for text in self._health.news() if self._health else ():
             self.message(printable(text))
+        while self._of_webs:
+            self.message(self._of_webs.popleft())
 
     def _progress(self, now_ns: int, passed_ns: int) -> Progress:
         scans = sum(item.scans for item in self._rack.statistics.values())

@@ -28,8 +28,11 @@ _MOST_LINES = 1000
 """Lines that wait to be shown; children that write more wait."""
 STAGE_NS = 800 * NS_PER_MS
 """Time that the processes of a stage have to end before those of the next are asked to."""
-END_NS = 10 * NS_PER_S
-"""A process that has not exited this long after SIGTERM is killed; the longest ``after_ns`` comes on top."""
+END_NS = 30 * NS_PER_S
+"""A process that runs this long after the run was asked to end is killed; the longest ``after_ns`` is added (decision).
+
+A process has to save its state on a busy disk, and may take ``LEAVE_S`` to leave the graph.
+"""
 GRACE_NS = 2 * NS_PER_S
 """Time that the other processes have to end by themselves after the first one has."""
 
@@ -109,6 +112,7 @@ class Supervisor:
         self._lines: queue.Queue[tuple[Callable[[str], None], str]] = queue.Queue(_MOST_LINES)
         self._stage = -1
         self._stage_ns = self._asked_ns = 0
+        self._killed: set[str] = set()
 
     @property
     def codes(self) -> dict[str, int]:
@@ -222,9 +226,14 @@ class Supervisor:
             for _, child in due:
                 child.send(signal.SIGTERM)
             self._stage, self._stage_ns = stage + 1, now
-        if now >= self._asked_ns + END_NS + max((post.after_ns for post, _ in alive), default=0):
-            for _, child in alive:
+        limit_ns = END_NS + max((post.after_ns for post, _ in alive), default=0)
+        if now >= self._asked_ns + limit_ns:
+            for post, child in alive:
                 child.send(signal.SIGKILL)
+                if post.name not in self._killed:
+                    late = f"{limit_ns / NS_PER_S:g} s after the run was asked to end"
+                    self._on_stderr(post.name, f"still runs {late}: it is killed")
+                self._killed.add(post.name)
 
 
 def _how(code: int) -> str:

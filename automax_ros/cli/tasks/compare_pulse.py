@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import TextIO
 
 from automax_ros.cli.options.values import naming
-from automax_ros.cli.output.csv_input import CsvFault, CsvTable
 from automax_ros.cli.output.files import opened_for_writing, require_different_files
 from automax_ros.cli.output.screen import ProgressBar
 from automax_ros.core.numbers import INT16_MAX
@@ -29,6 +28,7 @@ from automax_ros.core.user_error import UsageError
 from automax_ros.core.values import value_of, wanted, whole_number
 from automax_ros.logix.pmul import GAIN_ONE
 from automax_ros.logix.pulse_comparison import DEFAULT_MULTIPLIER, Pair, PulseComparison, PulseParameters
+from automax_ros.rackfile.reading.csv_table import CsvFault, CsvTable
 
 _ROWS_A_LOOK = 256
 """Rows between two updates of the progress bar."""

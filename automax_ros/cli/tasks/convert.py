@@ -1,8 +1,8 @@
 """Make task sources of an old plant acceptable, and show what changes; files are written only when told.
 
 CR LF and CR, Ctrl-Z and what follows it, control characters, tabs, lower case, REAL constants of blocks without a
-decimal point, lengths of strings above 255, UTF-16. Line numbers stay. Exit code 1: `automax check` finds errors in
-what came out.
+decimal point, lengths of strings above 255, UTF-16; an include file (.INC) next to a task is written into it in place
+of its INCLUDE. Line numbers stay. Exit code 1: `automax check` finds errors in what came out.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from automax_ros.cli.output.files import write_whole
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.user_error import UsageError
+from automax_ros.rackfile.old_plants.includes import include_reader
 from automax_ros.rackfile.old_plants.sources import Converted, convert
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 
@@ -48,6 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     for path, result in converted:
         print("\n".join(_difference(path, result)), end="\n" if result.before != result.after else "")
         print(f"{path}: {', '.join(result.notes) or 'nothing to change'}", file=sys.stderr)
+        for reason in result.refused:
+            print(f"{path}: {reason}", file=sys.stderr)
         if has_errors(check_text(path, result.after, target).diagnostics):
             print(f"{path}: `automax check` finds errors in what came out", file=sys.stderr)
             wrong += 1
@@ -88,7 +91,7 @@ def _convert(path: Path, target: TaskTarget) -> Converted:
         data = read_bytes(path)
     except FileFault as fault:
         raise UsageError(f"{path} {fault}") from fault
-    return convert(data, lambda text: check_text(path, text, target).diagnostics)
+    return convert(data, lambda text: check_text(path, text, target).diagnostics, include_reader(path.parent))
 
 
 def _difference(path: Path, result: Converted) -> Iterator[str]:

@@ -6,17 +6,15 @@ CODE is a code such as AMX4001 or just its number, or a code that the hardware s
 from __future__ import annotations
 
 import argparse
-import re
 import sys
-from importlib import resources
 
 from automax_ros.cli.output.screen import painted, wants_colour
 from automax_ros.cli.visible import write_control
 from automax_ros.core.problems import PROBLEMS, Problem
+from automax_ros.core.problems.pages import CODE, page_text, problems_called
 from automax_ros.core.text import quoted
 from automax_ros.core.user_error import UsageError
 
-_CODE = re.compile(r"(?:AMX)?([0-9]{4})")
 _NEAR = 3
 """Number of codes suggested for an unknown one."""
 
@@ -30,22 +28,20 @@ def run(arguments: argparse.Namespace) -> int:
     """Print a page, or the list of all codes."""
     found = list(PROBLEMS.values()) if arguments.code is None else _problems(arguments.code)
     if len(found) == 1:
-        write_control(sys.stdout, _page(found[0], colour=wants_colour(sys.stdout)))
+        colour = wants_colour(sys.stdout)
+        write_control(sys.stdout, page_text(found[0], lambda text: painted(text, "1") if colour else text))
     else:
         sys.stdout.write("".join(f"{_line(problem)}\n" for problem in found))
     return 0
 
 
 def _problems(text: str) -> list[Problem]:
-    asked = text.strip().upper()
-    match = _CODE.fullmatch(asked)
-    problem = PROBLEMS.get(f"AMX{match[1]}") if match else None
-    if problem is not None:
-        return [problem]
-    hardware = [item for item in PROBLEMS.values() if item.hardware and item.hardware.upper() == asked]
-    if hardware:
-        return hardware
-    raise UsageError(f"no problem code {quoted(text)}", _near(asked, int(match[1]) if match else None))
+    found = problems_called(text)
+    if not found:
+        asked = text.strip().upper()
+        match = CODE.fullmatch(asked)
+        raise UsageError(f"no problem code {quoted(text)}", _near(asked, int(match[1]) if match else None))
+    return found
 
 
 def _near(asked: str, number: int | None) -> str:
@@ -61,23 +57,3 @@ def _near(asked: str, number: int | None) -> str:
 def _line(problem: Problem) -> str:
     hardware = f" (code {problem.hardware} on the rack)" if problem.hardware else ""
     return f"{problem.code}  {problem.severity.value:7}  {problem.title}{hardware}"
-
-
-def _page(problem: Problem, *, colour: bool) -> str:
-    text = (
-        resources.files("automax_ros.core").joinpath("pages").joinpath(f"{problem.code}.md").read_text(encoding="utf-8")
-    )
-    lines: list[str] = []
-    fenced = False
-    for line in text.splitlines():
-        if line.startswith("```"):
-            fenced = not fenced
-        elif fenced:
-            lines.append(f"    {line}".rstrip())
-        elif line.startswith("#"):
-            heading = line.lstrip("#").strip()
-            heading += f" ({problem.severity.value})" if not lines else ""
-            lines.append(painted(heading, "1") if colour else heading)
-        else:
-            lines.append(line)
-    return "\n".join(lines) + "\n"

@@ -33,9 +33,12 @@ _FILES = (
     Problem("AMX6211", "Serial module of a PC3000"),
     # rack files: tasks
     Problem("AMX6300", "task name"),
-    Problem("AMX6220", "common that watch names"),
-    Problem("AMX6221", "common that watch names twice"),
-    Problem("AMX6222", "too many commons to watch"),
+    Problem("AMX6220", "common that watch or alarms names"),
+    Problem("AMX6221", "common that watch or alarms names twice"),
+    Problem("AMX6222", "too many commons in watch or alarms"),
+    Problem("AMX6225", "alarm that is not a boolean"),
+    Problem("AMX6223", "name in meant_so"),
+    Problem("AMX6224", "meant_so of what needs none", Severity.WARNING),
     Problem("AMX6301", "task name used twice in the rack"),
     Problem("AMX6302", "priority of a task"),
     Problem("AMX6303", "too many tasks on one Processor"),
@@ -86,6 +89,10 @@ _FILES = (
     Problem("AMX6310", "joint of a plant"),
     Problem("AMX6500", "common that a plant feeds and a task writes"),
     Problem("AMX6501", "too many plants"),
+    Problem("AMX6502", "web between plants that cannot hold it"),
+    Problem("AMX6503", "webs that cannot hang so"),
+    Problem("AMX6504", "impossible roll, roller or web"),
+    Problem("AMX6505", "roll or web that does not last", Severity.WARNING),
     Problem("AMX6520", "drive of a 57C405"),
     Problem("AMX6521", "armature voltage of a drive wired twice"),
     Problem("AMX6522", "plant of a 57C406 without a motor"),
@@ -110,6 +117,7 @@ _FILES = (
     Problem("AMX6496", "common that is read and never written", Severity.WARNING),
     Problem("AMX6497", "common that no task uses", Severity.WARNING),
     Problem("AMX6498", "drive without a plant", Severity.WARNING),
+    Problem("AMX6499", "plant that nothing drives", Severity.WARNING),
     # rack files: networks
     Problem("AMX6560", "name of a network"),
     Problem("AMX6561", "drop or depth of a network module"),
@@ -152,6 +160,8 @@ _FILES = (
     Problem("AMX6832", "no scan to replay"),
     Problem("AMX6833", "value that the recording does not hold"),
     Problem("AMX6834", "picture cannot be drawn"),
+    Problem("AMX6835", "recording that cannot be run again"),
+    Problem("AMX6836", "rerun that is not as recorded"),
     Problem("AMX6840", "nothing to play"),
     Problem("AMX6841", "speed reference of a report"),
     Problem("AMX6850", "plant not in the recording"),
@@ -191,6 +201,14 @@ _TIMES_AND_OLD_PLANTS = (
     Problem("AMX6785", "definition that cannot be an I/O point"),
     Problem("AMX6786", "definition on a module that the emulator does not have", Severity.WARNING),
     Problem("AMX6787", "task that the rack file leaves out", Severity.WARNING),
+    # `automax import`: databases of the Executive 3.x and 4.x
+    Problem("AMX6789", "part of an old rack that is lost"),
+    Problem("AMX6790", "damage of a dBASE file from which all records are read", Severity.WARNING),
+    Problem("AMX6791", "records that are marked as deleted", Severity.WARNING),
+    Problem("AMX6792", "value of a database that is not sure", Severity.WARNING),
+    Problem("AMX6793", "field of a database that is not understood", Severity.WARNING),
+    Problem("AMX6794", "module that a part code stands for", Severity.WARNING),
+    Problem("AMX6795", "part of an old rack that has no place in the rack file", Severity.WARNING),
 )
 _STIMULI = (
     Problem("AMX6730", "stimuli file cannot be read"),
@@ -208,6 +226,7 @@ _STIMULI = (
     Problem("AMX6742", "module or plant without such a control"),
     Problem("AMX6743", "too many entries in a stimuli file"),
     Problem("AMX6744", "stimuli file without entries", Severity.WARNING),
+    Problem("AMX6745", "table in a stimuli file"),
 )
 _RUN_TIME = (
     Problem("AMX7001", "output of a block clamped to 16 bits"),

@@ -27,7 +27,7 @@ FOREIGN_WORDS = {
     "RESUME": "errors do not stop a task; test the log with TST_ERRLOG@",
     "RANDOMIZE": "random numbers would make a run that cannot be repeated",
     "POKE": "use IOWRITE slot, register, value",
-    "INCLUDE": "write the statements here",
+    "INCLUDE": "write the statements here; `automax convert` does it with an include file next to the task",
     "CHAIN": "tasks are put into RUN by the rack",
     "MEMDEF": "common variables are defined in the rack's YAML file",
     "NVMEMDEF": "common variables are defined in the rack's YAML file",

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
 from automax_ros.messages.cdr.cdr import decode, head_reader
-from automax_ros.messages.types.messages import JointState, PlantState, VariableTable
+from automax_ros.messages.types.messages import JointState, PlantState, RollState, VariableTable, WebState
 
 _Head = TypeVar("_Head", bound="tuple[object, ...]")
 
@@ -58,14 +58,14 @@ def table_of(payload: bytes) -> VariableTable:
 
 
 def plant_stamp(type_name: str, payload: bytes) -> int:
-    """Return the stamp of a PlantState or of a JointState, ns.
+    """Return the stamp of a PlantState, RollState, WebState or JointState, ns.
 
     Raises:
         CdrError: the bytes are not one.
     """
     message = decode(type_name, payload)
-    assert isinstance(message, PlantState | JointState)
-    return message.stamp if isinstance(message, PlantState) else message.header.stamp
+    assert isinstance(message, PlantState | RollState | WebState | JointState)
+    return message.header.stamp if isinstance(message, JointState) else message.stamp
 
 
 def _head_of(name: str, head: type[_Head]) -> Callable[[bytes], _Head]:

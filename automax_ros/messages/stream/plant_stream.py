@@ -6,16 +6,18 @@ A plant is only metered (means, energies) if a sink takes its messages: metering
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import nan
+from math import fmod, nan, tau
 
 from automax_ros.drive.plant.plant import DrivePlant, Means
 from automax_ros.drive.plant.signals import Energies, signals_of
+from automax_ros.drive.web.end import WebEnd
+from automax_ros.drive.web.signals import END_SIGNALS
 from automax_ros.messages.cdr.cdr import encoder
 from automax_ros.messages.types.messages import NAMES, Header, JointState, PlantState
 from automax_ros.messages.types.topics import PLANT, Take, Takes, Topic
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import DrivenPlant
-from automax_ros.rackfile.model.ros_names import JOINTS, plant_topic
+from automax_ros.rackfile.model.ros_names import JOINTS, plant_topic, roll_joint
 
 NOT_METERED = Energies(nan, nan, nan, nan)
 
@@ -23,8 +25,8 @@ NOT_METERED = Energies(nan, nan, nan, nan)
 class _Plant:
     """One plant with its topics and the sinks of their messages."""
 
-    def __init__(self, driven: DrivenPlant, plant: DrivePlant, space: str) -> None:
-        self.driven, self.plant = driven, plant
+    def __init__(self, driven: DrivenPlant, plant: DrivePlant, end: WebEnd | None, space: str) -> None:
+        self.driven, self.plant, self.end = driven, plant, end
         name, slot = driven.name, driven.slot
         self.state_topic = Topic(f"{space}/{plant_topic(name)}", NAMES[PlantState], PLANT, slot, name)
         self.joint_topic = Topic(f"{space}/{JOINTS}", NAMES[JointState], PLANT, slot, name)
@@ -38,7 +40,8 @@ class PlantStream:
 
     def __init__(self, rack: Rack, space: str, stamp: Callable[[int], int]) -> None:
         self._rack, self._stamp = rack, stamp
-        self._plants = [_Plant(driven, rack.plants[driven.name], space) for driven in rack.part.driven]
+        plants, driven = rack.plants, rack.part.driven
+        self._plants = [_Plant(item, plants[item.name], plants.ends.get(item.name), space) for item in driven]
         self._encode_state, self._encode_joint = encoder(NAMES[PlantState]), encoder(NAMES[JointState])
 
     @property
@@ -74,7 +77,7 @@ class PlantStream:
                 for take in item.states:
                     take(stamp, payload)
             if item.joints:
-                payload = self._encode_joint(joint_message(item.driven, item.plant, stamp))
+                payload = self._encode_joint(joint_message(item.driven, item.plant, stamp, item.end))
                 for take in item.joints:
                     take(stamp, payload)
 
@@ -110,7 +113,17 @@ def state_message(driven: DrivenPlant, plant: DrivePlant, stamp: int) -> PlantSt
     )
 
 
-def joint_message(driven: DrivenPlant, plant: DrivePlant, stamp: int) -> JointState:
-    """Return the shaft of a plant as a joint: angle in rad, rad/s, torque of the motor in N m."""
-    motor, name = plant.motor, driven.config.joint_name
-    return JointState(Header(stamp, ""), (name,), (motor.angle_rad,), (motor.speed_rad_s,), (motor.torque_n_m,))
+def joint_message(driven: DrivenPlant, plant: DrivePlant, stamp: int, end: WebEnd | None = None) -> JointState:
+    """Return the shaft of a plant as a joint: angle in rad, rad/s, torque of the motor in N m.
+
+    A roll or roller is a second joint, which turns forward with the web; its torque is that of the motor after the
+    gear (decision).
+    """
+    motor, name, header = plant.motor, driven.config.joint_name, Header(stamp, "")
+    angle, speed, torque = motor.angle_rad, motor.speed_rad_s, motor.torque_n_m
+    if end is None:
+        return JointState(header, (name,), (angle,), (speed,), (torque,))
+    turned, ratio = fmod(tau * END_SIGNALS["roll_turns"](end), tau), end.sign / end.gear
+    return JointState(
+        header, (name, roll_joint(name)), (angle, turned), (speed, speed * ratio), (torque, torque / ratio)
+    )

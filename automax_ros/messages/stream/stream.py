@@ -16,6 +16,7 @@ from automax_ros.messages.cdr.cdr import Message, encode
 from automax_ros.messages.stream.plant_stream import PlantStream
 from automax_ros.messages.stream.rack_messages import RackMessages, topic_type_name, value_encoder
 from automax_ros.messages.stream.task_messages import TaskMessages
+from automax_ros.messages.stream.web_stream import WebStream
 from automax_ros.messages.types.topics import LATCHED, OPERATION, SCAN, VALUE, Sink, Take, Takes, Topic
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
@@ -80,6 +81,7 @@ class RackStream:
         self._values = self._value_topics(space)
         self._by_view = [self._values.get(view) for view in range(len(rack.config.variables))]
         self.plants = PlantStream(rack, space, self._messages.stamp)
+        self.webs = WebStream(rack, space, self._messages.stamp)
         self._tables: list[Take] = []
         self._images: list[Take] = []
         self._writes: list[Take] = []
@@ -98,10 +100,15 @@ class RackStream:
     def topics(self) -> list[Topic]:
         """All topics of the stream: of the part of the rack that is in this process."""
         if not self._rack.part.holds_common_memory:
-            return [*self.module_topics, *self.plants.topics]
+            return [*self.module_topics, *self.drive_topics]
         rack = [self.variables_topic, self.snapshot_topic, self.backplane_topic, self.operations_topic]
         values = (value.topic for value in self._values.values())
-        return [*rack, *self.module_topics, *values, *self.plants.topics]
+        return [*rack, *self.module_topics, *values, *self.drive_topics]
+
+    @property
+    def drive_topics(self) -> list[Topic]:
+        """The topics of plants, of their rolls and rollers, and of webs."""
+        return [*self.plants.topics, *self.webs.topics]
 
     @property
     def module_topics(self) -> list[Topic]:
@@ -138,6 +145,7 @@ class RackStream:
                 if every_state:
                     route(stream.each_state, self.states_topics[task.slot])
         self.plants.route(takes)
+        self.webs.route(takes)
         return takes
 
     def stamp(self, now_ns: int) -> int:
@@ -169,6 +177,7 @@ class RackStream:
                 self._send_state(task, self._rack.now_ns)
         self._rack.observe(self)
         self.plants.begin()
+        self.webs.begin()
         self._begun = True
 
     def send_image(self) -> None:

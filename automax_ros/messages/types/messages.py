@@ -279,6 +279,33 @@ class PlantState(NamedTuple):
     shaft_j: float
 
 
+class RollState(NamedTuple):
+    """The roll or roller of a plant at an instant."""
+
+    stamp: int
+    plant: str
+    web_mps: float
+    web_fpm: float
+    diameter_m: float
+    web_m: float
+    roll_turns: float
+
+
+class WebState(NamedTuple):
+    """A web between two plants at an instant."""
+
+    stamp: int
+    web: str
+    from_plant: str
+    to_plant: str
+    tension_n: float
+    strain_percent: float
+    draw_percent: float
+    slack_m: float
+    dancer_m: float
+    broken: bool
+
+
 class NetworkDrop(NamedTuple):
     """The message of a module for one drop of a network of racks: 32 registers."""
 
@@ -415,6 +442,7 @@ _OWN = (
     Operation,
     PlantState,
     Presence,
+    RollState,
     Scan,
     ScanError,
     TaskInfo,
@@ -423,6 +451,7 @@ _OWN = (
     Values,
     Variable,
     VariableTable,
+    WebState,
     Writer,
 )
 _STANDARD = (

@@ -6,13 +6,14 @@ All that has a number (variables, writers) is that of the whole rack.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
 from automax_ros.rackfile.model.config import DrivenPlant, RackConfig, driven_plants
 from automax_ros.rackfile.model.module import ModuleConfig
 from automax_ros.rackfile.model.plants import PlantConfig
+from automax_ros.rackfile.model.webs import WebConfig, joined_plants
 from automax_ros.runtime.memory.memory import CommonMemory
 from automax_ros.runtime.memory.registers import Backplane
 
@@ -53,17 +54,22 @@ class RackPart:
         """The names of its tasks."""
         return [task.name for module in self.modules for task in module.tasks]
 
-    def is_elsewhere(self, what: str | int) -> bool:
-        """Return whether a task or plant (by name) or a module (by slot) is in another process."""
-        return what in self._elsewhere
+    def is_elsewhere(self, kind: str, what: str | int) -> bool:
+        """Return whether a ``task``, ``plant``, ``web`` (by name) or ``module`` (by slot) is in another process."""
+        return what in self._elsewhere[kind]
 
     @cached_property
-    def _elsewhere(self) -> frozenset[str | int]:
-        return RackPart.of(self.config, None)._names - self._names
+    def _elsewhere(self) -> dict[str, frozenset[str | int]]:
+        return {kind: names - self._owned[kind] for kind, names in RackPart.of(self.config, None)._owned.items()}
 
     @property
-    def _names(self) -> frozenset[str | int]:
-        return frozenset[str | int]([*self.slots, *self.tasks, *(plant.name for plant in self.plants)])
+    def _owned(self) -> dict[str, frozenset[str | int]]:
+        return {
+            "module": frozenset(self.slots),
+            "task": frozenset(self.tasks),
+            "plant": frozenset(plant.name for plant in self.plants),
+            "web": frozenset(web.name for web in self.webs),
+        }
 
     @cached_property
     def driven(self) -> tuple[DrivenPlant, ...]:
@@ -72,18 +78,24 @@ class RackPart:
 
     @property
     def plants(self) -> list[PlantConfig]:
-        """The plants that its drives turn and all plants coupled to them, in the order of the file.
+        """The plants that its drives turn, and all that webs and couplings join to them, in the order of the file.
 
         Plants that no drive turns are in the process with common memory (decision).
         """
-        coupled = _find_coupled(self.config.plants)
+        joined = joined_plants(self.config.plants, self.config.webs)
         slots = {item.name: item.slot for item in driven_plants(self.config)}
         found = []
         for plant in self.config.plants:
-            driving = {slots[name] for name in coupled[plant.name] if name in slots} or {self.config.common_memory_slot}
+            driving = {slots[name] for name in joined[plant.name] if name in slots} or {self.config.common_memory_slot}
             if driving & self.slots:
                 found.append(plant)
         return found
+
+    @property
+    def webs(self) -> list[WebConfig]:
+        """The webs between its plants, in the order of the file."""
+        names = {plant.name for plant in self.plants}
+        return [web for web in self.config.webs if web.start in names]
 
     def elsewhere(self, memory: CommonMemory, backplane: Backplane) -> frozenset[tuple[int, int]]:
         """Return the views and elements of modules in other processes, which decide on their values."""
@@ -93,12 +105,3 @@ class RackPart:
             if bank is not None and module.slot not in self.slots:
                 found |= memory.registers.showing(bank.view, range(bank.registers))
         return frozenset(found)
-
-
-def _find_coupled(plants: Sequence[PlantConfig]) -> dict[str, set[str]]:
-    groups = {plant.name: {plant.name} for plant in plants}
-    for plant in plants:
-        if plant.couple is not None:
-            joined = groups[plant.name] | groups[plant.couple.to]
-            groups.update(dict.fromkeys(joined, joined))
-    return groups

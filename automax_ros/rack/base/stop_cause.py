@@ -10,6 +10,8 @@ STOP_ALL = "STOP ALL"
 
 KEEP_STATE = "keep_state"
 """The ``detail`` of a reload that carries values over."""
+WITHOUT_BATTERY = "without battery"
+"""The ``detail`` of a power-up after which non-volatile memory is lost too."""
 
 
 class OperationRefused(Exception):

@@ -88,7 +88,12 @@ class NetworkModule(QuietModule):
                 memory.watch(view, number, partial(self._written.add, drop))
         self._send: Send | None = None
         self._sequence = 0
+        self._is_played = False
         self._forget()
+
+    def play(self) -> None:
+        """Do nothing from now on: what it wrote in a recording is written from outside (``replay/rerun``)."""
+        self._is_played = True
 
     def connect(self, send: Send) -> None:
         """Set the function that transmits its frames from now on."""
@@ -122,12 +127,16 @@ class NetworkModule(QuietModule):
 
     def power_on(self) -> None:
         """Show its drop, and start its cycles."""
+        if self._is_played:
+            return
         self._forget()
         self._write(OWN_DROP, self._drop | VALID)
         self._begin(self._parts.scheduler.now_ns + CYCLE_NS)
 
     def power_off(self) -> None:
         """Stop sending; its memory is lost."""
+        if self._is_played:
+            return
         self._event.cancel()
         for number in range(self.config.registers.count):
             self._write(number, 0)

@@ -13,7 +13,14 @@ from automax_ros.core.names import AUTO_RUN
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import Value
 from automax_ros.rack.base.observers import Observers, Operation
-from automax_ros.rack.base.stop_cause import KEEP_STATE, OperationRefused, OperationsState, PowerReturn, StopCause
+from automax_ros.rack.base.stop_cause import (
+    KEEP_STATE,
+    WITHOUT_BATTERY,
+    OperationRefused,
+    OperationsState,
+    PowerReturn,
+    StopCause,
+)
 from automax_ros.rack.modules.module import Module
 from automax_ros.rack.operations.forces import ForceTable
 from automax_ros.rack.tasks.installation import Installation, PreparedReload, RackError
@@ -343,7 +350,7 @@ class Operations:
                 item.install(item.task.compiled, item.source)
         for module in self._modules:
             module.power_on()
-        self.reports.done("power_on")
+        self.reports.done("power_on", detail="" if battery else WITHOUT_BATTERY)
         if self._config.auto_run if auto_run is None else auto_run:
             again = [item for item in self._in_starting_order() if item.task.name in self.ran_at_power_off]
             self._run_together(again, self._next_tick)

@@ -173,6 +173,12 @@ class OperatorRequests:
             self._short("plant", text, MAX_NAME)
         SwitchOperations(self._rack).plant(name.strip().upper(), control.strip(), value.strip())
 
+    def web(self, name: str, control: str, value: str = "") -> None:
+        """Break, thread or change a web: ``W1``, ``break``; ``W1``, ``stiffness_n``, ``1.5e5``."""
+        for text in (name, control, value):
+            self._short("web", text, MAX_NAME)
+        SwitchOperations(self._rack).web(name.strip().upper(), control.strip(), value.strip())
+
     def reload(self, task: str, source: str, *, keep_state: bool = False) -> Fields:
         """Replace a task's source by a text.
 
@@ -309,7 +315,7 @@ class Concerns(Enum):
     SLOT = auto()
     """That of the module in the slot ``name``."""
     PLANT = auto()
-    """That of the plant ``name``."""
+    """That of the plant or web ``name``."""
     STATUS = auto()
     """All, or the one with common memory if the request is ``home_only``."""
     NONE = auto()
@@ -364,6 +370,7 @@ VERBS: Mapping[str, Verb] = {
     "unforce": Verb("automax_msgs/Unforce", Concerns.NAMES, OperatorRequests.unforce, OperatorRequests.forces_now),
     "module": Verb("automax_msgs/OperateControl", Concerns.SLOT, OperatorRequests.module),
     "plant": Verb("automax_msgs/OperateControl", Concerns.PLANT, OperatorRequests.plant),
+    "web": Verb("automax_msgs/OperateControl", Concerns.PLANT, OperatorRequests.web),
     "reload": Verb("automax_msgs/Reload", Concerns.TASK, OperatorRequests.reload, OperatorRequests.task_now),
     "get": Verb("automax_msgs/ReadValues", Concerns.NAMES, lambda requests, names: _readings(requests.read(names))),
     "forces": Verb(

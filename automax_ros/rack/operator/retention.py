@@ -2,7 +2,8 @@
 
 Kept are non-volatile commons, forces, the registers of a module that are not the process's inputs, such as the test
 switches of a UDC, and of each task tunables, locals and the error log (2.4.5, J2-3106-1 p. 13-4); with ``auto_run``
-also which tasks ran. The folder holds one file, ``state.json``, replaced as a whole.
+also which tasks ran; and outside the rack the web on rolls and between them (decision: yesterday's roll is not full
+again). The folder holds one file, ``state.json``, replaced as a whole.
 
 A start from it is a power-up: what a module loses without power is lost. A task whose source was edited starts as
 installed, since to load it again is an installation (decision). With ``auto_run`` the tasks that ran are put into RUN;
@@ -15,10 +16,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from automax_ros.compile.base.layout import Role, StateField
 from automax_ros.core.names import NameFault, element_name
@@ -42,6 +43,7 @@ MOST_BYTES = 64_000_000
 """Largest state file (decision: common memory and locals of four Processors are far below)."""
 _FILE = "state.json"
 Document = dict[str, Any]
+_T = TypeVar("_T")
 """The whole kept state, as JSON has it."""
 
 
@@ -129,6 +131,50 @@ def default_folder(config: RackConfig) -> Path:
     return config.path.parent / ".automax" / config.name
 
 
+def kept_forces(config: RackConfig, folder: Path) -> dict[str, Value]:
+    """Return what the state in a folder holds as forced, by the names of commons and of TASK.NAME; {} without a state.
+
+    Raises:
+        RetentionFault: the file cannot be read, is damaged, or is another rack's.
+    """
+    found: dict[str, Value] = {}
+
+    def take(document: Document) -> None:
+        forced = document["forced"].items()
+        found.update((str(name), value) for name, value in forced if isinstance(value, (bool, int, float, str)))
+
+    _read(folder / _FILE, config.name, take)
+    return found
+
+
+def _read(path: Path, rack: str, take: Callable[[Document], _T]) -> _T | None:
+    """Return what ``take`` returns for the kept state of a rack, None if there is none.
+
+    Raises:
+        RetentionFault: the file cannot be read, is damaged, or is another rack's.
+    """
+    try:
+        data = read_bytes(path, MOST_BYTES)
+    except FileFault as fault:
+        if isinstance(fault.__cause__, FileNotFoundError | NotADirectoryError):
+            return None
+        raise _fault(path, "AMX6710", f"cannot be used: it {fault}") from fault
+    try:
+        document = json.loads(data, parse_constant=_no_number)
+        if document["format"] != FORMAT:
+            raise ValueError(f"its format is {document['format']!r}, not {FORMAT}")
+        if document["rack"] != rack:
+            raise ValueError(f"it is that of rack {str(document['rack'])[:40]!r}")
+        return take(document)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise _fault(path, "AMX6711", f"is damaged: {_reason(error)}") from error
+
+
+def _fault(path: Path, code: str, message: str) -> RetentionFault:
+    hint = "remove it to start the rack as installed, or name another folder with --state"
+    return RetentionFault(f"the kept state {message}", hint, code=code, place=str(path))
+
+
 class Retention:
     """Keeps one rack's state in a folder."""
 
@@ -151,16 +197,7 @@ class Retention:
         Raises:
             RetentionFault: the file cannot be read, is damaged, is another rack's, or does not fit this one.
         """
-        try:
-            data = read_bytes(self.path, MOST_BYTES)
-        except FileFault as fault:
-            if isinstance(fault.__cause__, FileNotFoundError | NotADirectoryError):
-                return Restored()
-            raise self._fault("AMX6710", f"cannot be used: it {fault}") from fault
-        try:
-            return self._restore(json.loads(data, parse_constant=_no_number))
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-            raise self._fault("AMX6711", f"is damaged: {_reason(error)}") from error
+        return _read(self.path, self._rack.config.name, self._restore) or Restored()
 
     def present(self) -> Document:
         """Return the present state that is to be kept, between two scans."""
@@ -177,6 +214,8 @@ class Retention:
         document["registers"] = {name: value for name, value in self._present_registers() if value}
         own = (item for item in rack.forces() if rack.part.holds_common_memory or "." in item.name)
         document |= {"forced": {item.name: item.value for item in own}, "tasks": tasks}
+        if rack.plants.ends:
+            document["stock"] = rack.plants.stock()
         if rack.config.auto_run:
             # While the power is off those that ran before count as running.
             ran = frozenset() if rack.operations.powered else rack.operations.ran_at_power_off
@@ -198,7 +237,7 @@ class Retention:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             replace_file(self.path, json.dumps(present, allow_nan=False).encode())
         except OSError as error:
-            raise self._fault("AMX6712", f"cannot be written: {error.strerror}") from error
+            raise _fault(self.path, "AMX6712", f"cannot be written: {error.strerror}") from error
         self._saved = present
         return True
 
@@ -217,16 +256,14 @@ class Retention:
         return document
 
     def _restore(self, document: Document) -> Restored:
-        if document["format"] != FORMAT:
-            raise ValueError(f"its format is {document['format']!r}, not {FORMAT}")
-        if document["rack"] != self._rack.config.name:
-            raise ValueError(f"it is that of rack {str(document['rack'])[:40]!r}")
         notes: list[str] = []
         settings = list(self._settings(document["commons"], notes))
         commons = len({name.partition("(")[0] for name, _ in settings})
         settings += self._register_settings(document["registers"])
         tunables = self._restore_tasks(document["tasks"], notes)
         forces = self._force(document["forced"], notes)
+        edited = self._rack.plants.restock(document.get("stock", {}))
+        notes += [f"{name} was edited in the rack file: its roll, roller or web begins as installed" for name in edited]
         if self._rack.config.auto_run:
             self._begin_with(document.get("status", {}))
         for module in self._rack.modules:
@@ -315,10 +352,6 @@ class Retention:
     def _misfit(self, message: str) -> RetentionFault:
         hint = "change the rack file back, or remove the state to start the rack as installed"
         return RetentionFault(f"the kept state does not fit: {message}", hint, code="AMX6713", place=str(self.path))
-
-    def _fault(self, code: str, message: str) -> RetentionFault:
-        hint = "remove it to start the rack as installed, or name another folder with --state"
-        return RetentionFault(f"the kept state {message}", hint, code=code, place=str(self.path))
 
 
 def _kept_registers(rack: Rack) -> Iterator[tuple[int, int]]:

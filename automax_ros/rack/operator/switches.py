@@ -1,4 +1,4 @@
-"""Operations in and around a rack by hand: controls of modules, faults of plants.
+"""Operations in and around a rack by hand: controls of modules, faults of plants, breaks of webs.
 
 Stimuli, services and commands call them; observers receive each, refused ones too. Neither needs the rack's power
 (decision): a switch is a lever, and a plant is outside the rack.
@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from automax_ros.core.text import near_or_listed, printable, quoted
 from automax_ros.drive.base.errors import ParameterError
-from automax_ros.drive.plant.faults import execute_verb, values_of
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.modules.module import Operable
+from automax_ros.rack.operator.plant_verbs import VERBS_OF, named_in, read_values
 from automax_ros.rack.rack import Rack
 
 MOST_CHARACTERS = 100
@@ -21,8 +21,8 @@ class SwitchOperations:
     """The controls of one rack.
 
     Raises:
-        OperationRefused: all methods, if the module, plant or control does not exist, or the control cannot be moved
-            so.
+        OperationRefused: all methods, if the module, plant, web or control does not exist, or the control cannot be
+            moved so.
     """
 
     def __init__(self, rack: Rack) -> None:
@@ -53,26 +53,34 @@ class SwitchOperations:
         reports.done("module", detail=printable(f"{slot} {control} {position}"))
 
     def plant(self, name: str, verb: str, value: str) -> None:
-        """Break, mend or load a plant, now: ``UNWIND``, ``short_scr``, ``3``; ``drive/plant/faults`` has the verbs."""
-        reports = self._reports
+        """Break, mend or load a plant, now: ``UNWIND``, ``short_scr``, ``3``; ``PLANT_VERBS`` are the verbs."""
+        self._work("plant", name, verb, value, "it has none with a motor")
+
+    def web(self, name: str, verb: str, value: str = "") -> None:
+        """Break, thread or change a web, now: ``W1``, ``break``; ``WEB_VERBS`` are the verbs."""
+        self._work("web", name, verb, value, "it has none")
+
+    def _work(self, what: str, name: str, verb: str, value: str, none: str) -> None:
+        """Execute a verb on the plant or web (``what``) of a name; ``none`` is the hint where there are none."""
+        reports, plants = self._reports, self._rack.plants
+        known = named_in(plants, what)
         if len(value) > MOST_CHARACTERS:
             reason = f"a text of {len(value)} characters: at most {MOST_CHARACTERS}"
-            reports.refuse("plant", reason, detail=printable(f"{name} {verb}"))
-        detail = printable(f"{name} {verb} {value.strip()}")
-        plant = self._rack.plants.get(name)
-        if plant is None:
-            has = near_or_listed(name, self._rack.plants) or "it has none with a motor"
-            reports.refuse("plant", f"the rack has no plant {quoted(name)}: {has}", detail=detail)
+            reports.refuse(what, reason, detail=printable(f"{name} {verb}"))
+        detail = printable(f"{name} {verb} {value.strip()}".rstrip())
+        if name not in known:
+            has = near_or_listed(name, known) or none
+            reports.refuse(what, f"the rack has no {what} {quoted(name)}: {has}", detail=detail)
         try:
-            values = values_of(verb, value)
+            values = read_values(what, verb, value)
         except ParameterError as error:
-            reports.refuse("plant", str(error), detail=detail)
-        plant.advance(self._rack.now_ns)
+            reports.refuse(what, str(error), detail=detail)
+        plants.named(name).advance(self._rack.now_ns)
         try:
-            execute_verb(plant, verb, values)
+            VERBS_OF[what][verb].act(plants, name, values)
         except ParameterError as error:
-            reports.refuse("plant", str(error), detail=detail)
-        reports.done("plant", detail=detail)
+            reports.refuse(what, str(error), detail=detail)
+        reports.done(what, detail=detail)
 
     def load(self, name: str, torque_nm: float) -> None:
         """Load a plant's shaft (N m) as one of many samples: no operation is reported (decision)."""

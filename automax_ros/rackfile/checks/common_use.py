@@ -1,15 +1,16 @@
-"""Checks the writers and readers of each common of a rack: two writers, no writer, no use; and drives without a plant.
+"""Finds the writers and readers of each common of a rack; checks them: two writers, no writer, no use.
 
 All are warnings, and few of them false (decision). Writes before SCAN_LOOP, and those of a BASIC task that does its
 work once and ends, are initialisation: another task may write the common later. Elements of arrays count as separate
 unless both tasks name one by constants. If each task writes only constants to a BOOLEAN it is a handshake: one sets
 what the other resets. I/O points are wiring: writers of the points that a task reads are not searched for.
+What ``meant_so`` of the rack file names is left out (``omissions``).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from automax_ros.core.diagnostics import Diagnostic, Span
@@ -29,9 +30,10 @@ from automax_ros.language.tree.tree import (
     Statement,
 )
 from automax_ros.language.tree.walk import expressions_of, jumps_of, statements_in_order, targets_of, variables_in
-from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.modules.drive import DriveConfig
+from automax_ros.rackfile.model.config import CommonVariable, RackConfig
 
+Finding = tuple[str, Diagnostic]
+"""The common, plant or slot that is the matter, and what is said of it."""
 _NAMED = 6
 """Most commons that one warning names."""
 
@@ -45,8 +47,16 @@ class _Write(NamedTuple):
 
 def writer_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
     """Return the places where a task writes a common that another task writes too (AMX6495), by task."""
-    files = {task.name: task.file.name for _, task in config.placed_tasks}
     found: dict[str, list[Diagnostic]] = {}
+    for task, (name, diagnostic) in written_twice(config, programs):
+        if name not in config.meant_so:
+            found.setdefault(task, []).append(diagnostic)
+    return found
+
+
+def written_twice(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[tuple[str, Finding]]:
+    """Yield the second task of two that write one common, with what is said of it there (AMX6495)."""
+    files = {task.name: task.file.name for _, task in config.placed_tasks}
     written: dict[str, list[_Write]] = {}
     for _, task in config.placed_tasks:
         program = programs.get(task.name)
@@ -63,22 +73,12 @@ def writer_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict
                     f"{name} is written here, and in line {first.line} of {files[first.task]} by task {first.task}"
                 )
                 hint = "the last writer wins: use one task to write it, or give each its own common"
-                diagnostic = Diagnostic("AMX6495", message, second.target.span, second.line, hint)
-                found.setdefault(task.name, []).append(diagnostic)
+                yield task.name, (name, Diagnostic("AMX6495", message, second.target.span, second.line, hint))
             written.setdefault(name, []).extend(writes)
-    return found
 
 
-def rack_warnings(config: RackConfig, programs: Mapping[str, Program]) -> list[Diagnostic]:
-    """Return warnings about omissions in a rack file; ``programs`` are those of all its tasks.
-
-    AMX6496: tasks read a common that is never written; AMX6497: commons that are never used; AMX6498: the 57C406 of a
-    current minor loop has no plant.
-    """
-    return [*_find_unwritten(config, programs), *_find_unused(config, programs), *_without_plant(config, programs)]
-
-
-def _find_unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
+def never_written(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Finding]:
+    """Yield the commons that tasks read and nothing writes (AMX6496)."""
     files = {task.name: task.file.name for _, task in config.placed_tasks}
     written = _connected_names(config)
     written |= {item.name for item in config.declared if item.direction is Direction.IN or item.preset is not None}
@@ -86,7 +86,7 @@ def _find_unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iter
         written |= {target.name for target, _, _ in _targets(program, (*program.startup, *program.scan))}
     reads: dict[str, tuple[str, int | None]] = {}
     for name, program in programs.items():
-        for common, line in _reads(program):
+        for common, line in reads_of(program):
             reads.setdefault(common, (files[name], line))
     for variable in config.declared:
         read = reads.get(variable.name)
@@ -95,10 +95,11 @@ def _find_unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iter
             place = f"line {read[1]} of {read[0]}"
             message = f"{variable.name} is read in {place}, and no task writes it: it stays {zero}"
             hint = "let a task write it; or write ros: in for what comes from outside, or a preset"
-            yield Diagnostic("AMX6496", message, _place(config, variable.line), hint=hint)
+            yield variable.name, Diagnostic("AMX6496", message, first_word(config, variable.line), hint=hint)
 
 
-def _find_unused(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
+def never_used(config: RackConfig, programs: Mapping[str, Program]) -> list[CommonVariable]:
+    """Return the commons that no task declares and nothing else uses."""
     declared = {
         symbol.name
         for program in programs.values()
@@ -106,34 +107,25 @@ def _find_unused(config: RackConfig, programs: Mapping[str, Program]) -> Iterato
         if symbol.scope is Scope.COMMON
     }
     declared |= _connected_names(config)
-    unused = [item for item in config.declared if item.name not in declared and item.point is None]
-    if unused and programs:
+    return [item for item in config.declared if programs and item.name not in declared and item.point is None]
+
+
+def unused_warning(config: RackConfig, unused: Sequence[CommonVariable]) -> Iterator[Diagnostic]:
+    """Yield one warning for all commons that nobody uses (AMX6497)."""
+    if unused:
         named = [f"{item.name} (line {item.line})" for item in unused[:_NAMED]]
         more = f" and {len(unused) - _NAMED} more" if len(unused) > _NAMED else ""
         what = f"common {named[0]} is" if len(unused) == 1 else f"commons {', '.join(named)}{more} are"
         hint = "take out what is left over; or is a task missing?"
-        yield Diagnostic("AMX6497", f"the {what} used by no task", _place(config, unused[0].line), hint=hint)
-
-
-def _without_plant(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
-    drives = {module.slot: module for module in config.modules if isinstance(module, DriveConfig)}
-    for program in programs.values():
-        if program.cml is None:
-            continue
-        drive = drives.get(int(program.cml.facts["io_cntl_slot"]))
-        if drive is not None and drive.plant is None:
-            message = (
-                f"the {drive.model} in slot {drive.slot} has no plant: task {program.name} finds no line and no motor"
-            )
-            hint = f"write plant: NAME in slot {drive.slot}, and the plant under plants: (docs/plants.md)"
-            yield Diagnostic("AMX6498", message, _place(config, drive.line), hint=hint)
+        yield Diagnostic("AMX6497", f"the {what} used by no task", first_word(config, unused[0].line), hint=hint)
 
 
 def _connected_names(config: RackConfig) -> set[str]:
     return {*PREDEFINED, *(feed.common for feed in config.feeds), *(item.common for item in config.joint_commands)}
 
 
-def _place(config: RackConfig, line: int) -> Span:
+def first_word(config: RackConfig, line: int) -> Span:
+    """Return the place of the first word in a line of the rack file."""
     text = config.text.split("\n")[line - 1]
     start = len(text) - len(text.lstrip())
     return Span(line, start + 1, start + 1 + len(re.split(r"[\s:]", text[start:])[0]))
@@ -186,17 +178,22 @@ def _outputs(bound: BoundCall) -> Iterator[Reference | Element]:
     return (target for target in bound.targets if isinstance(target, (Reference, Element)))
 
 
-def _reads(program: Program) -> Iterator[tuple[str, int | None]]:
+def reads_of(program: Program) -> Iterator[tuple[str, int | None]]:
+    """Yield the name of each variable that a task reads, with the BASIC line."""
     for bound in program.calls.values():
         outputs = {output.name for output in bound.block.outputs}
         for keyword, value in bound.arguments.items():
             if keyword not in outputs:
                 yield from ((variable.name, bound.line) for variable in variables_in(value))
+    for event in program.events:
+        if event.interrupt_status is not None:
+            yield event.interrupt_status.name, event.number
     for statement, line in statements_in_order((*program.startup, *program.scan)):
         targets = targets_of(statement)
         for expression in expressions_of(statement):
-            if expression not in targets:
-                yield from ((variable.name, line) for variable in variables_in(expression))
+            inner = expression.subscripts if isinstance(expression, Element) else ()
+            for part in inner if expression in targets else (expression,):
+                yield from ((variable.name, line) for variable in variables_in(part))
 
 
 def _repeats(program: Program) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import pi, sqrt
 
 from automax_ros.compile.base.cost import CostModel, Model
 from automax_ros.compile.base.functions import BUILTINS
@@ -14,9 +15,10 @@ from automax_ros.compile.scan_times import command_ns
 from automax_ros.core.ticks import NS_PER_US
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
-from automax_ros.drive.assess.drive_case import Computing, DriveCase, GivenValue, Unjudged
+from automax_ros.drive.assess.drive_case import Computing, DriveCase, GivenValue, RollCase, Unjudged
 from automax_ros.drive.base.errors import ParameterError
 from automax_ros.drive.plant.plant import PlantData
+from automax_ros.drive.web.data import Roll
 from automax_ros.language.checks.rules.constant_values import constant_value
 from automax_ros.language.printer import print_expression
 from automax_ros.language.program import BoundCall, Program, places_that_write
@@ -233,7 +235,46 @@ def _case(
         voltage=any(module.drive == drive.slot for module in config.modules),
         registers=not drive.letter,
         computing=_computing(drive, config),
+        roll=_roll(drive.plant, config),
     )
+
+
+def _roll(plant: PlantConfig | None, config: RackConfig) -> RollCase | None:
+    surface = plant.surface if plant is not None else None
+    if plant is None or surface is None or not isinstance(surface.surface, Roll):
+        return None
+    web = next((item for item in config.webs if plant.name in (item.start, item.end)), None)
+    scales = {
+        signal: abs(feed.scale.counts[1] - feed.scale.counts[0]) / abs(feed.scale.value[1] - feed.scale.value[0])
+        for feed in reversed(config.feeds)
+        if feed.scale is not None and feed.plant in (plant.name, web.name if web is not None else "")
+        for signal in ("speed" if feed.signal in ("tach_rpm", "speed_rpm") else feed.signal,)
+    }
+    return RollCase(
+        surface.surface,
+        surface.gear,
+        full_diameter(plant.name, surface.surface, config),
+        web.data.stiffness_n if web is not None else None,
+        web.data.length_m if web is not None else 1.0,
+        scales.get("speed"),
+        scales.get("tension_n"),
+    )
+
+
+def full_diameter(name: str, roll: Roll, config: RackConfig) -> float:
+    """Return the diameter of a full roll, m: the given one, or for a winder that with all of its unwinder's web.
+
+    The web is as thick on the winder as its own caliper says (decision).
+    """
+    starts, plants = {item.end: item.start for item in config.webs}, {item.name: item for item in config.plants}
+    at = name
+    while at in starts:
+        at = starts[at]
+    source = plants[at].surface
+    if at == name or source is None or not isinstance(source.surface, Roll):
+        return roll.diameter_m
+    stock_m = source.surface.wound_m(source.surface.diameter_m)
+    return sqrt(roll.diameter_m**2 + 4 / pi * roll.caliper_um * 1e-6 * stock_m)
 
 
 def _computing(drive: RackDrive, config: RackConfig) -> Computing | None:

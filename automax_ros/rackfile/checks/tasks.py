@@ -12,9 +12,10 @@ from automax_ros.compile.base.cost import PLATFORMS, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec, Program
-from automax_ros.rackfile.checks.common_use import rack_warnings, writer_findings
+from automax_ros.rackfile.checks.common_use import writer_findings
 from automax_ros.rackfile.checks.drive_rules import drive_findings
 from automax_ros.rackfile.checks.interrupts import interrupt_findings
+from automax_ros.rackfile.checks.omissions import rack_warnings
 from automax_ros.rackfile.checks.udc_rules import udc_findings
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.module import ModuleConfig, TaskConfig

@@ -1,7 +1,8 @@
 """`scale` of a common variable: converts its counts on the module to the engineer's unit.
 
-On ROS 2 the variable is a Float32 in that unit, in both directions. Everywhere else, in tasks, `--set`, stimuli,
-reports and recordings of common memory, it is counts (decision).
+On ROS 2 the variable is a Float32 in that unit, in both directions; what people look at, reports, pictures, comparisons
+and trends, shows that unit too. In tasks, `--set`, stimuli, recordings of common memory and tables exported from them
+it is counts (decision).
 """
 
 from __future__ import annotations

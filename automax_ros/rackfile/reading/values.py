@@ -206,9 +206,9 @@ def whole_key(name: str, text: str, low: int, high: int, code: str, default: int
     return Key(name, schema, lambda node, what, findings: integer_value(node, what, findings, **limits))
 
 
-def flag_key(name: str, text: str) -> Key[bool]:
-    """Return the key of true or false, false by default."""
-    return Key(name, json_schema.flag(text, False), boolean_value)
+def flag_key(name: str, text: str, *, usual: bool = False) -> Key[bool]:
+    """Return the key of true or false; ``usual`` is shown by the schema only."""
+    return Key(name, json_schema.flag(text, usual), boolean_value)
 
 
 def text_key(name: str, schema: json_schema.Schema, limit: int = 100) -> Key[str]:

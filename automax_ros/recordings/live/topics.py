@@ -9,17 +9,25 @@ import automax_ros
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
 from automax_ros.messages.stream.rack_messages import SCALED_TYPE, topic_type_name, value_type_name
-from automax_ros.messages.types.messages import NAMES, JointState, PlantState, Variable, VariableTable
+from automax_ros.messages.types.messages import (
+    NAMES,
+    JointState,
+    PlantState,
+    RollState,
+    Variable,
+    VariableTable,
+    WebState,
+)
 from automax_ros.messages.types.rack_files import RACK_FILE, RackFile, fingerprint
 from automax_ros.messages.types.topics import LATCHED, OPERATION, PLANT, SCAN, VALUE, QosProfile
 from automax_ros.rackfile.model.config import RackConfig, driven_plants
-from automax_ros.rackfile.model.ros_names import JOINTS, plant_topic, topic_names
+from automax_ros.rackfile.model.ros_names import JOINTS, plant_topic, roll_topic, topic_names, web_topic
 
 MAX_VALUE_TOPICS = 2000
 """Most topics of common variables that a recorder subscribes to (decision: ROS serves no more at the pace of scans)."""
 
 MAX_PLANT_TOPICS = 100
-"""Most topics of plants that a recorder subscribes to (decision: a rack has far fewer drives)."""
+"""Most topics of plants that a recorder subscribes to, and of rolls, and of webs (decision: a rack has far fewer)."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +47,7 @@ class LiveTopics:
         """Determine the topics; without a table those of common variables are unknown.
 
         ``offered`` are the types of topics in the ROS graph: the table does not show which variables have a scale, nor
-        the plants. ``left_out`` is the number of topics of common variables beyond the limit.
+        the plants and webs. ``left_out`` is the number of topics of common variables beyond the limit.
         """
         self.variables = f"{space}/variables"
         self.snapshot = f"{space}/backplane/snapshot"
@@ -62,9 +70,11 @@ class LiveTopics:
             type_name = topic_type_name(variable)
             if variable.direction is not Direction.CLOSED and type_name and len(topics.values) < MAX_VALUE_TOPICS:
                 topics.values[f"{space}/{names[variable.name]}"] = TopicKind(type_name, VALUE)
-        state = NAMES[PlantState]
-        plants = {f"{space}/{plant_topic(item.name)}": [state] for item in driven_plants(config)}
-        topics.plants = _plants(space, {**plants, f"{space}/{JOINTS}": [NAMES[JointState]]})
+        offered = {plant_topic(item.name): NAMES[PlantState] for item in driven_plants(config)}
+        offered |= {roll_topic(plant.name): NAMES[RollState] for plant in config.plants if plant.surface is not None}
+        offered |= {web_topic(web.name): NAMES[WebState] for web in config.webs}
+        offered[JOINTS] = NAMES[JointState]
+        topics.plants = _plants(space, {f"{space}/{topic}": [kind] for topic, kind in offered.items()})
         return topics
 
     @property
@@ -105,11 +115,13 @@ def _values(space: str, table: VariableTable, offered: Mapping[str, Collection[s
 
 
 def _plants(space: str, offered: Mapping[str, Collection[str]]) -> dict[str, TopicKind]:
-    """Return the topics of plants: the state of each, and the joint states of all shafts."""
-    state, joint = NAMES[PlantState], NAMES[JointState]
-    begin = f"{space}/{plant_topic('')}"
-    names = sorted(name for name, types in offered.items() if name.startswith(begin) and state in types)
-    found = {name: TopicKind(state, PLANT) for name in names[:MAX_PLANT_TOPICS]}
+    """Return the topics of plants: states of each, of its roll and of each web; the joint states of all shafts."""
+    joint = NAMES[JointState]
+    found: dict[str, TopicKind] = {}
+    for topic_of, kind in ((plant_topic, PlantState), (roll_topic, RollState), (web_topic, WebState)):
+        begin, state = f"{space}/{topic_of('')}", NAMES[kind]
+        names = sorted(name for name, types in offered.items() if name.startswith(begin) and state in types)
+        found |= {name: TopicKind(state, PLANT) for name in names[:MAX_PLANT_TOPICS]}
     if found and joint in offered.get(f"{space}/{JOINTS}", ()):
         found[f"{space}/{JOINTS}"] = TopicKind(joint, PLANT)
     return found

@@ -136,6 +136,7 @@ class McapFile:
         self._definition_bytes = self._size = 0
         self._stream: CheckedStream | None = None
         self._place: int | None = None
+        self._begin = 0
         self._unpacker = Unpacker(path, 0)
         self.chunks_read = 0
         self.stored_bytes = 0
@@ -145,6 +146,15 @@ class McapFile:
     def position(self) -> int:
         """Number of bytes read so far."""
         return self._stream.position if self._stream is not None else 0
+
+    def after(self, position: int) -> McapFile:
+        """Return a reader of what follows on a ``position`` of this one, with the definitions that are known here.
+
+        It verifies the checksums of chunks, not that of the data as a whole.
+        """
+        other = McapFile(self.path)
+        other.channels, other.schemas, other._begin = self.channels, self.schemas, position
+        return other
 
     def records(self, *, messages: bool = True) -> Iterator[RawMessage | Attachment | Metadata]:
         """Yield messages (unless ``messages`` is FALSE), attachments and metadata in the order of the file.
@@ -212,13 +222,16 @@ class McapFile:
             self._size = os.fstat(file.fileno()).st_size
             self._unpacker = Unpacker(self.path, self._size)
             self._stream = stream = CheckedStream(file)
-            magic = stream.take(len(MAGIC))
+            magic = MAGIC if self._begin else stream.take(len(MAGIC))
             if magic != MAGIC:
                 if not self._salvage or not MAGIC.startswith(magic):
                     raise BagError("AMX6810", self.path, "is not an mcap file", NO_BAG_HINT)
                 self.damage.lose(len(magic), "is empty")
                 return
             skipped: frozenset[int] | None = None
+            if self._begin:
+                stream.jump(self._begin)
+                skipped = without
             while True:
                 begin = stream.position
                 try:
@@ -250,6 +263,8 @@ class McapFile:
                     self.define(opcode, content)
                 elif opcode not in _ENDS:
                     yield opcode, content
+                elif self._begin:
+                    return
                 else:
                     if not self._salvage:
                         self._check_end(stream, opcode, content, crc)

@@ -35,6 +35,8 @@ MOST_HELD_BYTES = 64 << 20
 """Most messages and most bytes that are held (decision)."""
 
 Source = TypeVar("Source")
+Decode = Callable[[bytes], Message]
+"""Returns the message in some bytes; raises CdrError."""
 
 
 def in_sent_order(records: Iterator[tuple[Source, RawMessage]]) -> Iterator[tuple[Source, RawMessage]]:
@@ -88,6 +90,14 @@ class BagMessage(NamedTuple):
     message: Message
 
 
+class Place(NamedTuple):
+    """A place in a recording, between two chunks: number of the file, bytes in it, and the file as read so far."""
+
+    file: int
+    position: int
+    data: McapFile
+
+
 class BagReader:
     """A recording: a rosbag2 folder or one .mcap file. It may be read any number of times, always as a stream.
 
@@ -107,6 +117,7 @@ class BagReader:
         self.last_stamp: int | None = None
         self.order: FileOrder | None = None
         self._after: FileOrder | None = None
+        self._reading: tuple[int, McapFile] | None = None
         if path.is_dir():
             self._information = read_information(path)
             self.files = _data_files(path, self._information)
@@ -128,19 +139,42 @@ class BagReader:
     def again(self) -> BagReader:
         """Return a reader of the same recording that does not report its progress."""
         other = copy.copy(self)
-        other.on_progress = other.last_stamp = other.order = other._after = None
+        other.on_progress = other.last_stamp = other.order = other._after = other._reading = None
         return other
+
+    @property
+    def place(self) -> Place | None:
+        """The place after the chunk of the message read last; None where messages are not in the order of the file."""
+        if self._reading is None or not self.is_ours:
+            return None
+        number, data = self._reading
+        return Place(number, data.position, data)
 
     @cached_property
     def custom_data(self) -> dict[str, str]:
         """The recorder's custom data in metadata.yaml, or in the copy of it in a single file; empty without any."""
-        information = self._information
-        if information is None:
-            try:
-                information = next(filter(None, map(recorded_information, self.metadata_records())), {})
-            except BagError:  # raised again when the messages are read
-                information = {}
-        return custom_data_of(information)
+        return custom_data_of(self._told)
+
+    @cached_property
+    def topics(self) -> dict[str, str]:
+        """The types of the topics that have messages, as metadata.yaml or the copy of it in a single file has them."""
+        entries = self._told.get("topics_with_message_count")
+        found: dict[str, str] = {}
+        for entry in entries if isinstance(entries, list) else ():
+            topic = entry.get("topic_metadata") if isinstance(entry, dict) else None
+            if isinstance(topic, dict) and str(entry.get("message_count")) != "0":
+                found[str(topic.get("name"))] = str(topic.get("type"))
+        return found
+
+    @cached_property
+    def _told(self) -> dict[str, Any]:
+        """The content of metadata.yaml, or of the copy of it in a single file; empty without any."""
+        if self._information is not None:
+            return self._information
+        try:
+            return next(filter(None, map(recorded_information, self.metadata_records())), {})
+        except BagError:  # raised again when the messages are read
+            return {}
 
     @cached_property
     def is_ours(self) -> bool:
@@ -148,18 +182,26 @@ class BagReader:
         return "version" in self.custom_data
 
     def messages(
-        self, *, topics: Collection[str] | None = None, types: Collection[str] | None = None
+        self,
+        *,
+        topics: Collection[str] | None = None,
+        types: Collection[str] | None = None,
+        after: Place | None = None,
+        decoders: Mapping[str, Decode] | None = None,
     ) -> Iterator[BagMessage]:
         """Yield the decoded messages in the order of sending, of all topics and types or only of those given.
+
+        ``after`` is a ``place`` of an earlier reading: the messages after it are read alone. ``decoders`` decode
+        messages of some types in another way, such as in parts.
 
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits, its files do not follow each other in
                 time, or a message to be returned has an unknown type or one that was recorded with another definition.
         """
-        records = self._read_with_sources()
+        records = self._read_with_sources(after)
         for source, record in records if self.is_ours else in_sent_order(records):
             self.last_stamp = record.publish_time
-            channel = source.channel(record, types, topics)
+            channel = source.channel(record, types, topics, decoders)
             if channel.wanted:
                 yield channel.decoded(record)
 
@@ -171,15 +213,18 @@ class BagReader:
         """
         return (record for _, record in self._read_with_sources())
 
-    def _read_with_sources(self) -> Iterator[tuple[DataSource, RawMessage]]:
+    def _read_with_sources(self, after: Place | None = None) -> Iterator[tuple[DataSource, RawMessage]]:
         """Yield the messages as stored in the files, each with its file."""
         total = sum(size_of(file) for file in self.files)
         before = 0
         order = self.new_order()
-        for file in self.files:
+        for index, file in enumerate(self.files):
+            if after is not None and index < after.file:
+                continue
             source = DataSource(file)
             last_log: int | None = None
-            data = McapFile(file)
+            data = McapFile(file) if after is None or index > after.file else after.data.after(after.position)
+            self._reading = index, data
             for number, record in enumerate(data.records()):
                 if not number & _PROGRESS_MASK and self.on_progress is not None:
                     self.on_progress(min(1.0, (before + data.position) / total))
@@ -270,7 +315,11 @@ class DataSource:
         self.channels: dict[int, ChannelReader] = {}
 
     def channel(
-        self, record: RawMessage, types: Collection[str] | None, topics: Collection[str] | None = None
+        self,
+        record: RawMessage,
+        types: Collection[str] | None,
+        topics: Collection[str] | None = None,
+        decoders: Mapping[str, Decode] | None = None,
     ) -> ChannelReader:
         """Return the reader of a message's channel; it is created at the channel's first message.
 
@@ -281,25 +330,29 @@ class DataSource:
         if channel is None:
             type_name = record.schema.name if record.schema else ""
             wanted = (topics is None or record.channel.topic in topics) and (types is None or type_name in types)
-            channel = self.channels[record.channel.id] = ChannelReader(self.path, record.channel, record.schema, wanted)
+            channel = self.channels[record.channel.id] = ChannelReader(
+                self.path, record.channel, record.schema, wanted, (decoders or {}).get(type_name)
+            )
         return channel
 
 
 class ChannelReader:
     """Decodes the messages of one channel of one file."""
 
-    def __init__(self, file: Path, channel: Channel, schema: Schema | None, wanted: bool) -> None:
+    def __init__(
+        self, file: Path, channel: Channel, schema: Schema | None, wanted: bool, decode: Decode | None = None
+    ) -> None:
         self.topic = channel.topic
         self.type_name = schema.name if schema else ""
         self.wanted = wanted
         self._file = file
-        self._decode: Callable[[bytes], Message] | None = None
+        self._decode: Decode | None = None
         if wanted:
             if channel.message_encoding != "cdr":
                 text = f"the messages of {channel.topic[:247]} are in {channel.message_encoding[:40]!r}, not in CDR"
                 raise BagError("AMX6811", file, text)
             require_known(file, channel.topic, schema)
-            self._decode = decoder(self.type_name)
+            self._decode = decode or decoder(self.type_name)
 
     def decoded(self, record: RawMessage) -> BagMessage:
         """Return a record of this channel with its decoded message.

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from automax_ros.core.kinds import WriteKind, WriterKind
 from automax_ros.core.names import NameFault, element_name
 from automax_ros.core.ticks import seconds_text
+from automax_ros.messages.cdr.message_parts import decode_errors, decode_writes_of
 from automax_ros.messages.types.messages import (
     CommonImage,
     CommonWrite,
     PlantState,
+    RollState,
     Scan,
     TaskState,
     Variable,
     VariableTable,
+    WebState,
 )
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.common_log import (
@@ -28,7 +32,7 @@ from automax_ros.recordings.read.common_log import (
     watched_by_default,
     watched_by_name,
 )
-from automax_ros.recordings.read.reader import BagMessage, BagReader
+from automax_ros.recordings.read.reader import BagMessage, BagReader, Decode
 from automax_ros.recordings.read.run_facts import run_facts
 from automax_ros.recordings.read.span import span_of
 from automax_ros.recordings.tables.states import WatchedStates, states_for
@@ -36,7 +40,7 @@ from automax_ros.recordings.tables.states import WatchedStates, states_for
 MAX_GRID_ROWS = 20_000_000
 """Most rows of an export on a grid of time (decision): a day at 5.5 ms has 15.7 million."""
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "VariableTable"))
-_SCAN = "automax_msgs/msg/Scan"
+_SCAN, _WRITE = "automax_msgs/msg/Scan", "automax_msgs/msg/CommonWrite"
 
 Change = tuple[int, dict[int, Cell]]
 """Nanoseconds from the start of the run, and the new values by index of column."""
@@ -44,6 +48,8 @@ Progress = Callable[[float], None]
 """Called with the share that is done, 0 to 1."""
 TakeWrites = Callable[[int, WriterKind, Sequence[tuple[str, Cell]]], None]
 """Called with the time from the start of the run in ns, the writer, and names with values."""
+TakeMessage = Callable[[int, Any], None]
+"""Called with the time from the start of the run in ns, and a message of the type that was asked for."""
 _OUTSIDE = (WriterKind.ROS, WriterKind.OPERATOR)
 
 
@@ -71,10 +77,12 @@ class Series:
     """The watched variables of a recording, to be read once.
 
     Without ``watch`` all simple numeric and boolean variables are watched; array elements are named like ``TABLE%(3)``,
-    locals of tasks like ``SPEED.RATIO%``, signals of plants like ``UNWIND/current_a``.
+    locals of tasks like ``SPEED.RATIO%``, signals of plants like ``UNWIND/current_a``, of webs like ``W1/tension_n``.
     ``columns`` are the watched variables, ``rack`` and ``origin_ns`` the rack's name and the stamp at the start of its
     run; ``end_ns`` is the end of the part that was read, after reading. ``take_scan``, if given, is called with each
-    scan of the window, ``take_writes`` with the writes of operators, stimuli and ROS: writer, and names with values.
+    scan of the window, ``take_writes`` with the writes of operators, stimuli and ROS: writer, and names with values,
+    ``also`` with each message of the window of further types, by the type's name; what they have is not watched by it.
+    With ``brief``, scans without errors have no values, and what is not watched is not decoded.
 
     Raises:
         BagError: the recording cannot be read or has no common memory, or a name in ``watch`` is unknown.
@@ -88,14 +96,18 @@ class Series:
         progress: Progress | None = None,
         take_scan: Callable[[int, Scan], None] | None = None,
         take_writes: TakeWrites | None = None,
+        also: Mapping[str, TakeMessage] | None = None,
+        *,
+        brief: bool = False,
     ) -> None:
         self._bag = bag
         self._window = window
         self._reader = BagReader(bag)
         self._reader.on_progress = progress
         self._take_scan, self._take_writes = take_scan, take_writes
-        types = _TYPES | {_SCAN} if take_scan else _TYPES
-        self._messages = self._reader.messages(types=types | states_for(watch or ()))
+        self._also = dict(also or {})
+        own = (_TYPES | {_SCAN} if take_scan else _TYPES) | states_for(watch or ())
+        self._alone = frozenset(self._also) - own
         self._log = CommonLog(bag, run_facts(self._reader))
         table, variables = self._log.facts.table, self._log.variables
         self._states = WatchedStates(bag)
@@ -106,6 +118,11 @@ class Series:
         self._values = WatchedValues(self.columns)
         self._outside = {item.id: WriterKind(item.kind) for item in table.writers if item.kind in _OUTSIDE}
         self._named = {item.id: item for item in variables.values()}
+        decoders: dict[str, Decode] = {}
+        if brief:
+            numbers = {column.variable for column in self.columns}
+            decoders = {_SCAN: decode_errors, _WRITE: decode_writes_of(numbers, self._named, self._outside)}
+        self._messages = self._reader.messages(types=own | self._also.keys(), decoders=decoders)
         self._require_few_rows(progress)
 
     def changes(self) -> Iterator[Change]:
@@ -148,9 +165,13 @@ class Series:
         values, instant = self._values, self.origin_ns
         for entry in self._messages:
             message = entry.message
+            if entry.type_name in self._also:
+                self._take_also(entry)
+                if entry.type_name in self._alone:
+                    continue
             states: Iterable[tuple[int, Cell]] = ()
             entries: Iterable[Entry] | None = ()
-            if isinstance(message, (TaskState, PlantState)):
+            if isinstance(message, (TaskState, PlantState, RollState, WebState)):
                 states = self._states.values(message)
             elif isinstance(message, (CommonImage, CommonWrite)):
                 entries = self._log.take(message)
@@ -182,6 +203,12 @@ class Series:
             time = max(0, message.stamp - self.origin_ns)
             if self._window.holds(time):
                 self._take_scan(time, message)
+
+    def _take_also(self, entry: BagMessage) -> None:
+        message: Any = entry.message
+        time = message.stamp - self.origin_ns
+        if self._window.holds(time):
+            self._also[entry.type_name](time, message)
 
     def _note_writes(self, message: CommonWrite, entries: Iterable[Entry]) -> None:
         """Report a write from outside, without the registers under I/O points, which repeat the same write."""

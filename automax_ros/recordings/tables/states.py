@@ -1,7 +1,7 @@
-"""Recorded states as columns: locals and block states of tasks, signals of plants.
+"""Recorded states as columns: locals and block states of tasks, signals of plants, of their rolls and of webs.
 
-Names of locals have a period, such as ``SPEED.RATIO%``, those of signals a slash, such as ``UNWIND/current_a``, and
-those of commons neither.
+Names of locals have a period, such as ``SPEED.RATIO%``, those of signals a slash, such as ``UNWIND/current_a`` or
+``W1/tension_n``, and those of commons neither.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from pathlib import Path
 
 from automax_ros.core.text import near_or_listed
 from automax_ros.core.types import DataType, type_of_name
-from automax_ros.messages.types.messages import NAMES, PlantState, TaskState
+from automax_ros.drive.web.signals import END_KINDS, WEB_KINDS
+from automax_ros.messages.types.messages import NAMES, PlantState, RollState, TaskState, WebState
+from automax_ros.rackfile.model.plant_signals import ALL_KINDS, ALL_UNITS, SIGNAL_KINDS
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.common_log import Watched
 
@@ -21,32 +23,26 @@ _NOT_COMMON = -1
 _LOCAL = re.compile(r"(?P<task>[A-Z][A-Z0-9_]{0,63})\.(?P<field>[^()\[\]]{1,80}?) ?(?:[(\[](?P<index>\d{1,9})[)\]])?")
 _SIGNAL = re.compile(r"(?P<plant>[A-Z][A-Z0-9_]{0,63})/(?P<signal>[A-Z_]{1,40})")
 _LOCAL_HINT = "write TASK.NAME, such as SPEED.RATIO%, or TASK.NAME(3) for an element"
-_SIGNAL_HINT = "write PLANT/SIGNAL, such as UNWIND/current_a"
-_UNITS = {
-    "current_a": "A",
-    "current_rms_a": "A",
-    "voltage_v": "V",
-    "torque_nm": "N m",
-    "load_nm": "N m",
-    "speed_rpm": "rpm",
-    "position_rad": "rad",
-    "field": "",
-    "line_hz": "Hz",
-    "line_v": "V",
-    "line_j": "J",
-    "loss_j": "J",
-    "stored_j": "J",
-    "shaft_j": "J",
+_SIGNAL_HINT = "write PLANT/SIGNAL or WEB/SIGNAL, such as UNWIND/current_a or W1/tension_n"
+State = TaskState | PlantState | RollState | WebState
+"""A message that has states."""
+_KIND_OF = {
+    **dict.fromkeys(SIGNAL_KINDS, PlantState),
+    **dict.fromkeys(END_KINDS, RollState),
+    **dict.fromkeys(WEB_KINDS, WebState),
 }
-"""Units of the signals that are REALs; ``bridge`` is an INTEGER, ``contactor`` a BOOLEAN."""
-_KINDS = {**dict.fromkeys(_UNITS, DataType.REAL), "bridge": DataType.INTEGER, "contactor": DataType.BOOLEAN}
 
 
 def states_for(names: Collection[str]) -> set[str]:
     """Return the types of the states that hold what these names ask for; none for commons."""
-    slashes = ["/" in name for name in names]
-    periods = ["." in name for name in names]
-    return {NAMES[kind] for kind, wanted in ((PlantState, slashes), (TaskState, periods)) if any(wanted)}
+    found: set[str] = set()
+    for name in names:
+        _, slash, signal = "".join(name.split()).partition("/")
+        if slash:
+            found.add(NAMES[_KIND_OF.get(signal.lower(), PlantState)])
+        elif "." in name:
+            found.add(NAMES[TaskState])
+    return found
 
 
 class WatchedStates:
@@ -56,9 +52,9 @@ class WatchedStates:
         self._bag = bag
         self._columns: dict[str, Watched] = {}
         self._locals: dict[str, list[tuple[int, str, int]]] = {}
-        self._signals: dict[str, list[tuple[int, str]]] = {}
+        self._signals: dict[tuple[type, str], list[tuple[int, str]]] = {}
         self._places: dict[str, tuple[str, list[tuple[int, int]]]] = {}
-        self._plants: set[str] = set()
+        self._seen: set[tuple[type, str]] = set()
 
     def add(self, column: int, asked: str) -> Watched:
         """Watch a local or signal, in the column of this index unless it has one already; return its description.
@@ -87,24 +83,25 @@ class WatchedStates:
         if match is None:
             raise BagError("AMX6821", self._bag, f"{asked[:80]!r} is not a name of a plant's signal", _SIGNAL_HINT)
         plant, signal = match["plant"], match["signal"].lower()
-        if signal not in _KINDS:
-            text = f"a plant has no signal {signal!r}"
-            raise BagError("AMX6821", self._bag, text, near_or_listed(signal, _KINDS, f"{plant}/"))
+        if signal not in ALL_KINDS:
+            text = f"a plant or web has no signal {signal!r}"
+            raise BagError("AMX6821", self._bag, text, near_or_listed(signal, ALL_KINDS, f"{plant}/"))
         label = f"{plant}/{signal}"
         if label not in self._columns:
-            self._columns[label] = Watched(label, _NOT_COMMON, column, _KINDS[signal], _UNITS.get(signal, ""))
-            self._signals.setdefault(plant, []).append((column, signal))
+            self._columns[label] = Watched(label, _NOT_COMMON, column, ALL_KINDS[signal], ALL_UNITS.get(signal, ""))
+            self._signals.setdefault((_KIND_OF[signal], plant), []).append((column, signal))
         return self._columns[label]
 
-    def values(self, state: TaskState | PlantState) -> Iterator[tuple[int, float]]:
+    def values(self, state: State) -> Iterator[tuple[int, float]]:
         """Yield column and value of what is watched in a state.
 
         Raises:
             BagError: the task has no such local, or the state is inconsistent.
         """
-        if isinstance(state, PlantState):
-            self._plants.add(state.plant)
-            for column, signal in self._signals.get(state.plant, ()):
+        if not isinstance(state, TaskState):
+            owner = type(state), state.web if isinstance(state, WebState) else state.plant
+            self._seen.add(owner)
+            for column, signal in self._signals.get(owner, ()):
                 yield column, getattr(state, signal)
         elif state.task in self._locals:
             known = self._places.get(state.task)
@@ -119,13 +116,15 @@ class WatchedStates:
                 yield column, state.value[place]
 
     def require_all(self) -> None:
-        """Check that the recording contained states of all requested tasks and plants.
+        """Check that the recording contained states of all requested tasks, plants and webs.
 
         Raises:
             BagError: it contained none of one.
         """
         self._require("AMX6827", "task", self._locals, list(self._places))
-        self._require("AMX6850", "plant", self._signals, sorted(self._plants))
+        for kind, what in ((PlantState, "plant"), (RollState, "roll or roller of plant"), (WebState, "web")):
+            asked, seen = ([name for own, name in names if own is kind] for names in (self._signals, self._seen))
+            self._require("AMX6850", what, asked, sorted(seen))
 
     def _require(self, code: str, kind: str, asked: Collection[str], seen: Sequence[str]) -> None:
         missing = [name for name in asked if name not in seen]

@@ -31,13 +31,17 @@ Floats = npt.NDArray[np.float64]
 
 
 class TraceRole(enum.IntEnum):
-    """The role of a line in its lane: reference, lagged reference, feedback, the plant's value, or another."""
+    """The role of a line in its lane: reference, lagged reference, feedback, the plant's value, or another.
+
+    ``BACKGROUND`` is what a plant has next to other lines that are not meant to agree with it.
+    """
 
     REFERENCE = 0
     LAGGED = 1
     FEEDBACK = 2
     PLANT = 3
     OTHER = 4
+    BACKGROUND = 5
 
 
 @dataclass(frozen=True)

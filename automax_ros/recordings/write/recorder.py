@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,18 +21,24 @@ _FIRST = EventKey(EventClass.OUTSIDE, -1, "")
 """Before all other events of an instant: the rack is in the state that the previous instant left."""
 
 
+EDITED, STOCK = "edited", "stock"
+"""Keys of a recording's custom data: what was edited; what a rack with rolls and webs has found on them (JSON)."""
+
+
 @dataclass(frozen=True)
 class RecordingOptions:
     """Options that select what is recorded, and into how many files.
 
     A file ends at each multiple of ``split_ns`` of rack time, 0 for never. ``tasks`` are those whose scans and states
     are recorded, None for all; common memory is always recorded whole. ``every_state``: a state after each such scan.
+    ``edited``: what was edited and when, in words, if the run is that of another recording with an edit.
     """
 
     storage: StorageOptions = field(default_factory=StorageOptions)
     split_ns: int = 0
     tasks: frozenset[str] | None = None
     every_state: bool = False
+    edited: str = ""
 
 
 class Recorder(Recording):
@@ -52,6 +59,10 @@ class Recorder(Recording):
             "version": automax_ros.__version__,
             "fingerprint": f"{rack.fingerprint:016x}",
         }
+        if options.edited:
+            provenance[EDITED] = options.edited
+        if rack.plants.found:
+            provenance[STOCK] = json.dumps(rack.plants.found)
         scheduler = rack.scheduler
         writer = BagWriter(
             folder,
@@ -67,6 +78,21 @@ class Recorder(Recording):
             first_ns = (rack.now_ns // options.split_ns + 1) * options.split_ns
             rack.scheduler.every(options.split_ns, first_ns, _FIRST, lambda now_ns, _: self._split(now_ns))
         self._takes = stream.add_sink(self._sink, tasks=options.tasks, every_state=options.every_state)
+
+    @property
+    def has_tasks(self) -> bool:
+        """Whether there are tasks whose scans it could record."""
+        return bool(self._rack.tasks)
+
+    @property
+    def scans(self) -> int:
+        """The number of scans recorded so far; what a task does before its first, scan 0, counts too."""
+        topics = {topic.name for topic in self._stream.scans_topics.values()}
+        return self._writer.count(topics)
+
+    def begin_here(self) -> None:
+        """Record the present state first, between two scans: the stream has begun before, and the rack runs already."""
+        self._stream.repeat_facts(self._takes)
 
     def flush(self, now_ns: int) -> None:
         """Hand a chunk whose time has passed at a rack time to the operating system, even without new messages.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -126,6 +126,10 @@ class BagWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def count(self, topics: Collection[str]) -> int:
+        """Return the number of messages of these topics."""
+        return sum(channel.message_count for name, channel in self._channels.items() if name in topics)
 
     def channel(self, topic: str, type_name: str, qos: QosProfile) -> RecordedChannel:
         """Return the channel of a topic; the first call for a topic creates it.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from array import array
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
@@ -13,6 +14,8 @@ from rclpy.parameter import Parameter
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.user_error import UserError
+from automax_ros.rack.operator.requests import VERBS
+from automax_ros.ros.base.qos import message_class
 from automax_ros.ros.clients import recorded_run as participants
 from automax_ros.ros.clients.recorded_run import racks_of
 from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
@@ -143,6 +146,16 @@ class RackClient:
             self._spin(deadline, name)
         return future.result()
 
+    def ask(self, verb: str, fields: Mapping[str, Any], wait_ns: int) -> dict[str, Any]:
+        """Send a request of ``VERBS`` with the fields of its type; return the fields of the answer, as plain data.
+
+        Raises:
+            NotOperable: as ``call``.
+        """
+        package, _, kind = VERBS[verb].type_name.partition("/")
+        service = message_class(f"{package}/srv/{kind}")
+        return plain_fields(self.call(service, verb, service.Request(**fields), wait_ns))
+
     def _go_on(self) -> None:
         if self._should_stop():
             raise Interrupted
@@ -173,3 +186,16 @@ class RackClient:
         there = sorted(name.removesuffix("/variables") for name in tables if self._node.count_publishers(name))
         hint = f"there are {', '.join(there)}" if there else "start it first, or set its ROS_DOMAIN_ID"
         return NotOperable(f"no rack {self._space} is seen within {wait_ns / NS_PER_S:g} s", hint)
+
+
+def plain_fields(message: Any) -> dict[str, Any]:
+    """Return the fields of a message of rclpy, sequences as lists, messages in them likewise as fields."""
+    found = {name: getattr(message, name) for name in message.get_fields_and_field_types()}
+    return {name: list(map(_plain, value)) if isinstance(value, _SEQUENCES) else value for name, value in found.items()}
+
+
+def _plain(value: Any) -> Any:
+    return plain_fields(value) if hasattr(value, "get_fields_and_field_types") else value
+
+
+_SEQUENCES = (list, tuple, array)

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from rclpy.context import Context
 from rclpy.node import Node
@@ -110,21 +110,53 @@ class RecorderNode(Node):  # type: ignore[misc]
         return sorted(space for space in spaces if f"{space}/variables" in tables)
 
 
-class LiveRecorder:
-    """Finds a rack and records it; always call ``close``.
+class Receiver(Protocol):
+    """Receives the messages of a rack in the order in which they were sent, as ``LiveRecording`` does."""
 
-    ``recording`` is None until ``open``.
+    notes: list[str]
+    files_begun: int
+
+    @property
+    def wants_image(self) -> bool:
+        """Whether it waits for an image of common memory."""
+        ...
+
+    @property
+    def wants_states(self) -> bool:
+        """Whether it waits for states of tasks."""
+        ...
+
+    def take(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        """Take a message, sent at a time of the rack's clock."""
+
+    def store(self, files: Sequence[RackFile]) -> None:
+        """Take the files of the rack again: a task was reloaded."""
+
+    def flush(self, passed_ns: int) -> None:
+        """Do what is due when no message has come for a time."""
+
+    def close(self) -> None:
+        """End: no more messages follow."""
+
+
+_Receiver = TypeVar("_Receiver", bound=Receiver)
+
+
+class LiveRecorder:
+    """Finds a rack and records it, or lets another ``Receiver`` follow it; always call ``close``.
+
+    ``recording`` is None until ``open`` or ``follow``; ``name`` is the node's, if it does not record.
 
     Raises:
         RosUnavailable: ROS cannot be initialised.
     """
 
-    def __init__(self, space: str, arguments: RosArguments = NO_ARGUMENTS) -> None:
-        self.recording: LiveRecording | None = None
+    def __init__(self, space: str, arguments: RosArguments = NO_ARGUMENTS, name: str | None = None) -> None:
+        self.recording: Receiver | None = None
         self.lost_values: Counter[str] = Counter()
         self._space = space
         self._context = joined_context(arguments)
-        self._node = RecorderNode(space, self._context, recorder_name(arguments))
+        self._node = RecorderNode(space, self._context, name or recorder_name(arguments))
         self._topics = LiveTopics(space)
         self._table = b""
         self._order: SendOrder[tuple[str, bytes]] = SendOrder(HOLD_NS)
@@ -229,19 +261,29 @@ class LiveRecorder:
         Raises:
             RecordingError: the folder exists already or cannot be written.
         """
+        return self.follow(lambda topics: LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns))
+
+    def follow(
+        self, make: Callable[[LiveTopics], _Receiver], others: Mapping[str, TopicKind] | None = None
+    ) -> _Receiver:
+        """Subscribe; ``step`` gives messages to what ``make`` returns for the rack's topics, and those of ``others``.
+
+        ``make`` may take topics of common variables away.
+        """
         offered = dict(self._node.get_topic_names_and_types())
         self._topics = topics = LiveTopics(self._space, table_of(self._table), offered)
-        self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns)
-        kinds = topics.all
+        receiver = self.recording = make(topics)
+        kinds = {**(others or {}), **topics.all}
         early, self._early = self._early, {}
         for name, subscription in list(early.items()):
             if subscription.kind != kinds.get(name):
                 early.pop(name).close()  # the rack is not what its file says
         self._subscriptions = [
-            early.get(name) or RawSubscription(self._node, name, kinds[name]) for name in topics.in_order
+            early.get(name) or RawSubscription(self._node, name, kinds[name])
+            for name in (*(others or ()), *topics.in_order)
         ]
         self._files = self._files or RawSubscription(self._node, topics.config, _FILES)
-        return self.recording
+        return receiver
 
     def step(self) -> None:
         """Take the messages received and record those that are due."""

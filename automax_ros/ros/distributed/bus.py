@@ -41,8 +41,9 @@ from automax_ros.messages.bus.bus import (
 from automax_ros.messages.bus.peers import BEAT_NS, Peer, Peers, PresenceVerdict
 from automax_ros.messages.cdr.cdr import encode
 from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Stage
+from automax_ros.rack.base.part import RackPart
 from automax_ros.rack.distributed.image_sync import Batch, ImageCopy, ImageSync
-from automax_ros.rackfile.model.config import ModuleLoss, driven_plants
+from automax_ros.rackfile.model.config import ModuleLoss
 from automax_ros.rackfile.processes import part_name
 from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.qos import ros_qos
@@ -96,7 +97,8 @@ class ProcessLayout:
 class DistributedMemory:
     """One process's connection to the bus. ``fault`` is the reason why the process cannot take part, else None.
 
-    ``process_slots`` are the slots of each process by the slot that names it, ``plants`` those of the plants' drives.
+    ``process_slots`` are the slots of each process by the slot that names it, ``plants`` has that slot for each plant
+    and web.
     """
 
     def __init__(self, rack_context: RackContext, nodes: Sequence[ModuleNode], process_layout: ProcessLayout) -> None:
@@ -113,7 +115,10 @@ class DistributedMemory:
         self._rack_context, self._rack, self._node = rack_context, rack, node
         self.process_slots = {min(slots): tuple(slots) for slots in processes}
         self._limits = BusLimits(self.process_slots)
-        self.plants = {item.name: item.slot for item in driven_plants(rack.config)}
+        self.plants: dict[str, int] = {}
+        for slot, slots in self.process_slots.items():
+            part = RackPart.of(rack.config, slots)
+            self.plants |= {plant.name: slot for plant in part.plants} | {web.name: slot for web in part.webs}
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._watch, self._lead_ns = ProcessWatch(), process_layout.start_delay_ns
         self.peers = Peers(process, min(own), own, rack.installed, process_layout.run_id, lives=self._watch.lives)

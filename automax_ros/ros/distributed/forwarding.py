@@ -60,7 +60,7 @@ class RequestForwarder:
     """
 
     def __init__(self, node: ModuleNode, bus: DistributedMemory, reloaded: Callable[[], None]) -> None:
-        """Find the process of each task, slot and plant."""
+        """Find the process of each task, slot, plant and web."""
         self._reloaded = reloaded
         config = node.rack_context.rack.config
         self._node, self._bus, self._config = node, bus, config

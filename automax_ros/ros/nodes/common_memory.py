@@ -3,7 +3,7 @@
 Publishes: ``variables`` (automax_msgs/VariableTable, latched), ``config`` (std_msgs/String, latched: the rack's YAML
 file and the tasks' sources as JSON), ``backplane`` (automax_msgs/CommonWrite), ``backplane/snapshot``
 (automax_msgs/CommonImage, latched, sent again to each late joiner of either), ``common/NAME`` (std_msgs, latched) for
-each variable with ``ros: out`` or ``ros: in``.
+each variable with ``ros: out`` or ``ros: in``; rolls, rollers and webs that no drive turns, as ``drive_plant_SLOT``.
 
 Subscribes: ``common/NAME/set`` (std_msgs) for each variable with ``ros: in``, and for no other;
 ``JOINT_velocity_controller/commands`` and ``JOINT_effort_controller/commands`` (std_msgs/Float64MultiArray) where a
@@ -29,6 +29,7 @@ from automax_ros.ros.base.node import MAIN_NODE, ModuleNode, RackContext
 from automax_ros.ros.base.qos import ros_qos
 from automax_ros.ros.base.rack_health import RackHealth
 from automax_ros.ros.base.write_topic import ScaledWriter, subscribe_values, subscribe_variable
+from automax_ros.ros.nodes.webs import drive_outlet
 from automax_ros.runtime.memory.views import MemoryValueError
 
 TYPE = "std_msgs/msg/Float64MultiArray"
@@ -70,7 +71,7 @@ class CommonMemoryNode(ModuleNode):
             if own.slot is None:
                 joined = own in (stream.snapshot_topic, stream.backplane_topic)
                 # The latched image may be as old as the run.
-                outlets[own] = self.outlet(own, stream.send_image if joined else None)
+                outlets[own] = self.outlet(own, stream.send_image) if joined else drive_outlet(self, own)
         self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
         self._files: list[RackFile] = []
         outlets[stream.operations_topic] = partial(self._send_operation, outlets[stream.operations_topic])

@@ -1,7 +1,9 @@
 """The node ``drive_plant_SLOT`` (``drive_plant_SLOT_A`` and ``_B`` of a UDC): the plant that a drive turns.
 
 Publishes: ``joint_states`` (sensor_msgs/JointState), the shaft as a joint with the plant's name, and ``plants/NAME``
-(automax_msgs/PlantState), both 100 times per second of rack time; its part of ``/diagnostics``.
+(automax_msgs/PlantState), both 100 times per second of rack time; its part of ``/diagnostics``. With a roll or roller
+also ``rolls/NAME`` (automax_msgs/RollState), and for a web that comes from it ``webs/WEB`` (automax_msgs/WebState) and
+``webs/WEB/tension`` (std_msgs/Float32, N).
 
 Subscribes: ``plants/NAME/load_torque/set`` (std_msgs/Float64, N m) where the plant's load says ``ros: in``, and no
 other topic. A torque applies from the instant of its arrival. Observers are not notified of an operation: PlantState
@@ -22,6 +24,7 @@ from automax_ros.rackfile.model.config import DrivenPlant
 from automax_ros.rackfile.model.ros_names import load_topic
 from automax_ros.ros.base.node import ModuleNode, RackContext
 from automax_ros.ros.base.write_topic import WriteTopic
+from automax_ros.ros.nodes.webs import drive_outlet
 
 
 class DrivePlantNode(ModuleNode):
@@ -31,7 +34,7 @@ class DrivePlantNode(ModuleNode):
         super().__init__(rack_context, "_".join(filter(None, ("drive_plant", str(driven.slot), driven.drive))))
         self._driven, self._plant = driven, rack_context.rack.plants[driven.name]
         outlets = {
-            topic: self.outlet(topic) for topic in rack_context.stream.plants.topics if topic.plant == driven.name
+            topic: drive_outlet(self, topic) for topic in rack_context.stream.drive_topics if topic.plant == driven.name
         }
         rack_context.stream.add_sink(outlets.get)
         modules = {module.config.slot: module for module in rack_context.rack.modules}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -43,6 +44,18 @@ class Stimulus:
     actions: tuple[Action, ...]
     is_value: bool
     everywhere: bool = False
+
+
+@dataclass(frozen=True)
+class Operate:
+    """One operation on the task, variable, module, plant or web ``of``, "" for the whole rack."""
+
+    of: str
+    operation: Callable[[], object]
+
+    def do(self, _: WavePlayer, /) -> None:
+        """Execute it."""
+        self.operation()
 
 
 class WavePlayer:
@@ -97,6 +110,30 @@ class WavePlayer:
         events = [] if wave.for_ns is None else [scheduler.at(began + wave.for_ns, key, end)]
         events.append(scheduler.every(SAMPLE_NS, began + SAMPLE_NS, key, sample))
         self._driven[signal.label] = events
+
+    def follow(self, signal: Signal, times_ns: Sequence[int], values: Sequence[Value]) -> None:
+        """Write each value at its time, counted from now on and ascending; it holds until the next one.
+
+        A value is written once: what a task writes meanwhile stays until the next one's time.
+        """
+        self.rest(signal)
+        began = self.scheduler.now_ns
+        self._count += 1
+        key = EventKey(EventClass.OUTSIDE, _BEGUN, f"{self._count:09d}")
+        events: list[ScheduledEvent] = []
+
+        def write_from(place: int) -> None:
+            now_ns = self.scheduler.now_ns
+            last = bisect_right(times_ns, now_ns - began)
+            if last > place:
+                self._sample(signal, values[last - 1])
+            if last == len(times_ns):
+                self.rest(signal)
+            else:
+                events[:] = [self.scheduler.at(began + times_ns[last], key, lambda _: write_from(last))]
+
+        self._driven[signal.label] = events
+        write_from(0)
 
     def rest(self, signal: Signal) -> None:
         """End the wave that drives a signal, if any; the signal's value stays."""

@@ -1,4 +1,4 @@
-"""Reads the verbs that operate a rack: force, tune, run, stop, reload, power, module, plant and the others."""
+"""Reads the verbs that operate a rack: force, tune, run, stop, reload, power and the others."""
 
 from __future__ import annotations
 
@@ -14,157 +14,28 @@ from automax_ros.core.text import did_you_mean, near_or_listed, quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_of, wanted
 from automax_ros.core.yaml_text import Node, Scalar, YamlMapping, YamlSequence
-from automax_ros.drive.base.errors import ParameterError
-from automax_ros.drive.plant.faults import VERBS, PlantVerb, values_of
 from automax_ros.rack.base.local_names import LocalElement, local_named
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.modules.module import Operable
 from automax_ros.rack.operations.forces import Target
-from automax_ros.rack.operator.switches import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.rackfile.model.config import CommonElement
-from automax_ros.rackfile.reading.files import FileFault, read_task_source, stays_next_to
+from automax_ros.rackfile.reading.files import FileFault, read_task_source
 from automax_ros.rackfile.reading.values import (
     ProblemList,
     Section,
     boolean_value,
-    entries_of,
-    integer_value,
     is_plain_word,
     kind_of,
     text_value,
     wrong_kind,
 )
 from automax_ros.runtime.tasks.task import Task
-from automax_ros.scenario.stimuli.player import Action, WavePlayer
+from automax_ros.scenario.stimuli.control_verbs import control_verbs
+from automax_ros.scenario.stimuli.player import Action, Operate, WavePlayer
 from automax_ros.scenario.stimuli.signals import RackSignals
+from automax_ros.scenario.stimuli.table import Places, table_verb
 from automax_ros.scenario.stimuli.values import Read, StimuliVerb, cut_short, named, time_of, value_for, value_verbs
-
-
-def read_plant_work(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
-    """Return the actions on plants: ``{UNWIND: {short_scr: 3}}``."""
-    controls = SwitchOperations(rack)
-    found: list[Action] = []
-    for key, item in named(node, what, findings):
-        name = findings.upper_case(key.text, key.span)
-        where = f"{what} {name}"
-        if rack.part.is_elsewhere(name):
-            continue
-        if name not in rack.plants:
-            hint = near_or_listed(name, rack.plants) or "a plant needs a motor to be simulated"
-            message = f"the rack has no plant {quoted(key.text)} that can be operated"
-            findings.add("AMX6742", message, key.span, hint)
-        entries = entries_of(item, where, findings)
-        if entries == ():
-            findings.add("AMX6008", f"{where} names nothing", item.span)
-        for verb, value in entries or ():
-            text = _text(verb, value, where, findings)
-            if text is not None:
-                found.append(Operate(name, partial(controls.plant, name, verb.text, text)))
-    return found
-
-
-def _text(verb: Scalar, node: Node, where: str, findings: ProblemList) -> str | None:
-    """Return the value of a verb as commands and services write it; None if a problem was reported."""
-    known = VERBS.get(verb.text)
-    if known is None:
-        message = f"{where} has no control {quoted(verb.text)}"
-        findings.add("AMX6742", message, verb.span, near_or_listed(verb.text, VERBS))
-        return None
-    if isinstance(node, YamlMapping) and known.keys:
-        text = _join_values(known, node, f"{verb.text} of {where}", findings)
-        if not text:
-            return None
-    else:
-        text = _plain(node)
-    try:
-        values_of(verb.text, text)
-    except ParameterError:
-        given = quoted(text) if isinstance(node, YamlMapping) and known.keys else kind_of(node)
-        message = f"{verb.text} of {where} cannot be {given}: it takes {known.wants}"
-        findings.add("AMX6736", message, node.span)
-        return None
-    return text
-
-
-def _plain(node: Node) -> str:
-    return node.text if isinstance(node, Scalar) and not node.is_null else ""
-
-
-def _join_values(verb: PlantVerb, node: YamlMapping, what: str, findings: ProblemList) -> str:
-    """Return the values of a form with keys, one after the other; "" if a problem was reported.
-
-    A value that is left out before another is the usual one.
-    """
-    section = Section(node, what, verb.keys, findings)
-    if not section.require(verb.keys[: verb.needed], what, node.span):
-        return ""
-    given = [section.get(key) for key in verb.keys]
-    last = max(place for place, value in enumerate(given) if value is not None)
-    return " ".join(
-        f"{verb.usual[place - verb.needed]:g}" if value is None else _plain(value)
-        for place, value in enumerate(given[: last + 1])
-    )
-
-
-def control_verbs(rack: Rack) -> Mapping[str, StimuliVerb]:
-    """Return the verbs ``module`` and ``plant``."""
-    return {"module": StimuliVerb(partial(_module, rack)), "plant": StimuliVerb(partial(read_plant_work, rack))}
-
-
-def _module(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Action]:
-    controls, by_slot = SwitchOperations(rack), {module.config.slot: module for module in rack.modules}
-    found: list[Action] = []
-    for key, item in named(node, what, findings):
-        plain = Scalar(key.text, True, key.span)  # JSON accepts only keys in quotes
-        slot = integer_value(plain, f"slot of {what}", findings, low=0, high=15, code="AMX6200")
-        if slot is None:
-            continue
-        module = by_slot.get(slot)
-        if module is None and rack.part.is_elsewhere(slot):
-            continue
-        if module is None:
-            findings.add("AMX6742", f"the rack has no module in slot {slot}", key.span)
-            continue
-        known = module.controls if isinstance(module, Operable) else {}
-        where = f"the {module.config.model} in slot {slot}"
-        entries = entries_of(item, where, findings)
-        if entries == ():
-            findings.add("AMX6008", f"{where}: no control is named", item.span)
-        for control, position in entries or ():
-            if _is_position(control, position, where, known, findings):
-                move = partial(controls.module, str(slot), control.text, _plain(position))
-                found.append(Operate(str(slot), move))
-    return found
-
-
-def _is_position(
-    key: Scalar, node: Node, where: str, known: Mapping[str, tuple[str, ...]], findings: ProblemList
-) -> bool:
-    """Return whether a control of a module has the position in a file; report it if not."""
-    if key.text not in known:
-        message = f"{where} has no control {quoted(key.text)}"
-        findings.add("AMX6742", message, key.span, near_or_listed(key.text, known))
-        return False
-    positions = known[key.text]
-    if not isinstance(node, Scalar) or node.is_null or (positions and node.text not in positions):
-        takes = ", ".join(positions) if positions else "a number"
-        findings.add("AMX6736", f"{key.text} of {where} cannot be {kind_of(node)}: it takes {takes}", node.span)
-        return False
-    return True
-
-
-@dataclass(frozen=True)
-class Operate:
-    """One operation on the task, variable, module or plant ``of``, "" for the whole rack."""
-
-    of: str
-    operation: Callable[[], object]
-
-    def do(self, _: WavePlayer) -> None:
-        """Execute it."""
-        self.operation()
 
 
 @dataclass(frozen=True)
@@ -197,12 +68,14 @@ _PATH_LIMIT = 200
 
 
 def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> Mapping[str, StimuliVerb]:
-    """Return all verbs of a rack. Sources to reload must be in the folder of the stimuli file or of the rack file."""
+    """Return all verbs of a rack. Sources and tables must be in the folder of the stimuli file or of the rack file."""
     tasks = _Tasks(rack)
-    sources = _Sources(rack, stimuli_file, allow_outside)
+    places = Places((stimuli_file, rack.config.path), allow_outside)
+    sources, signals = _Sources(rack, places), RackSignals(rack)
     operations = rack.operations
     return {
-        **value_verbs(RackSignals(rack)),
+        **value_verbs(signals),
+        "table": table_verb(signals, places),
         "force": StimuliVerb(partial(_force, rack), everywhere=True),
         "unforce": StimuliVerb(partial(_unforce, rack), everywhere=True),
         "tune": StimuliVerb(tasks.tune),
@@ -249,7 +122,7 @@ class _Tasks:
         """Return a task; None for one in another process of a distributed rack, which executes the entry (decision)."""
         name = findings.upper_case(key.text, key.span)
         known = {task.name: task for task in self.rack.tasks}
-        if name not in known and not self.rack.part.is_elsewhere(name):
+        if name not in known and not self.rack.part.is_elsewhere("task", name):
             message = f"the rack has no task {quoted(key.text)}"
             findings.add("AMX6739", message, key.span, near_or_listed(name, known))
         return known.get(name)
@@ -306,7 +179,7 @@ def _forceable(rack: Rack, key: Scalar, findings: ProblemList) -> Target | None:
 
 
 def _local(rack: Rack, key: Scalar, findings: ProblemList) -> LocalElement | None:
-    if rack.part.is_elsewhere(key.text.partition(".")[0].strip().upper()):
+    if rack.part.is_elsewhere("task", key.text.partition(".")[0].strip().upper()):
         return None
     try:
         meant = local_named(rack.tasks, key.text)
@@ -355,8 +228,7 @@ def _unforce(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[A
 @dataclass(frozen=True)
 class _Sources:
     rack: Rack
-    stimuli_file: Path
-    allow_outside: bool
+    places: Places
 
     def reload(self, node: Node, what: str, findings: ProblemList) -> list[Action]:
         """Read tasks with a file, or with ``file`` and ``keep_state``."""
@@ -386,14 +258,12 @@ class _Sources:
             message = f"{quoted(text)} cannot replace task {task.name}, whose source is a {suffix} file"
             findings.add("AMX6740", message, node.span)
             return None
-        folders = (self.stimuli_file, self.rack.config.path)
-        inside = [file.parent / text for file in folders if self.allow_outside or stays_next_to(text, file)]
-        if not inside:
+        path = self.places.find(text)
+        if path is None:
             message = f"{quoted(text)} lies outside the folders of the stimuli file and of the rack file"
             hint = "put it next to one of them, or allow it with --allow-outside"
             findings.add("AMX6740", message, node.span, hint)
             return None
-        path = next((path for path in inside if path.exists()), inside[0])
         try:
             return read_task_source(path)
         except FileFault as fault:

@@ -22,6 +22,7 @@ from automax_ros.scenario.stimuli.player import Stimulus
 from automax_ros.scenario.stimuli.rack_verbs import rack_verbs
 from automax_ros.scenario.stimuli.schema import MOST_ENTRIES, VERB_SCHEMAS
 from automax_ros.scenario.stimuli.signals import LoneSignals
+from automax_ros.scenario.stimuli.table import Places, table_verb
 from automax_ros.scenario.stimuli.values import VALUE_VERBS, StimuliVerb, time_of, value_verbs
 
 MOST_BYTES = 2_000_000
@@ -52,8 +53,9 @@ def read_for_rack(path: Path, rack: Rack, *, allow_outside: bool = False) -> Sti
 
 
 def read_for_task(path: Path, lone: StandaloneTask) -> StimuliFile:
-    """Read a file for a lone task: set, ramp, sine and square on its variables."""
-    return _read(path, value_verbs(LoneSignals(lone)), RACK_ONLY)
+    """Read a file for a lone task: set, ramp, sine, square and table on its variables."""
+    signals = LoneSignals(lone)
+    return _read(path, {**value_verbs(signals), "table": table_verb(signals, Places((path,)))}, RACK_ONLY)
 
 
 def _read(path: Path, verbs: Mapping[str, StimuliVerb], elsewhere: tuple[str, ...]) -> StimuliFile:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from automax_ros.core.json_schema import (
     Keys,
     Schema,
@@ -17,7 +19,8 @@ from automax_ros.core.json_schema import (
     words,
 )
 from automax_ros.core.ticks import MOST_SECONDS
-from automax_ros.drive.plant.faults import VERBS, PlantVerb
+from automax_ros.rack.operator.plant_verbs import PLANT_VERBS, WEB_VERBS, WorkVerb
+from automax_ros.scenario.stimuli.table import LINEAR, VALUES
 from automax_ros.scenario.stimuli.values import LEAST_HZ
 from automax_ros.scenario.stimuli.waves import MOST_HZ
 
@@ -67,7 +70,13 @@ def _square(text: str) -> Schema:
     return {**entries(text, _NAME, {}), "patternProperties": {**boolean, **number_of}, "minProperties": 1}
 
 
-def _of_plant(verb: PlantVerb) -> Schema:
+def _work(text: str, verbs: Mapping[str, WorkVerb]) -> Schema:
+    return {**section(text, {name: _of_plant(verb) for name, verb in verbs.items()}), "minProperties": 1}
+
+
+def _of_plant(verb: WorkVerb) -> Schema:
+    if verb.is_alone:
+        return _always("It takes no value.")
     text = f"{verb.wants[:1].upper()}{verb.wants[1:]}."
     if not verb.keys:
         return scalar(text)
@@ -87,6 +96,17 @@ _SINE: Keys = {
     "for": _FOR,
 }
 _SQUARE: Keys = {"low": scalar("The low level."), "high": scalar("The high level."), "hz": _HZ, "for": _FOR}
+_TABLE: Keys = {
+    "file": line("The CSV table, below the folder of the stimuli file or of the rack file.", 200),
+    "time": line("The column with the times of rows, s; `time_s` without it.", 200),
+    "columns": _map_schema("Variables, each with the name of its column.", scalar("The column's name.")),
+    "hold": words(
+        "`true`: a row holds until the next one; `linear`: numbers go from row to row in straight lines.",
+        (True, "on", "On", "ON", 1, LINEAR),
+        True,
+    ),
+    "values": words("`counts`, as those of `set`, or `unit`: by the `scale` of variables.", VALUES, VALUES[0]),
+}
 _RELOAD: Keys = {
     "file": line("The source, below the folder of the stimuli file or of the rack file.", 200),
     "keep_state": flag("Carry values over by name.", False),
@@ -100,6 +120,7 @@ VERB_SCHEMAS: Keys = {
     "ramp": _wave("From the present value to `to` in `over` seconds.", _RAMP, "to", "over"),
     "sine": _wave("A sine: a sample each millisecond.", _SINE, "amplitude", "hz"),
     "square": _square("Half a period high, half a period low; a BOOLEAN needs no levels."),
+    "table": section("Columns of a CSV table drive variables, by the times of its rows.", _TABLE, ("file", "columns")),
     "force": _values("Holds simple variables, commons or TASK.NAME, at a value."),
     "unforce": _names("Releases what is forced; `all` for everything."),
     "tune": _values("Sets tunables, TASK.NAME."),
@@ -120,11 +141,15 @@ VERB_SCHEMAS: Keys = {
         {**entries("Switches with their positions.", "^[a-z_]+$", scalar("A position.")), "minProperties": 1},
     ),
     "plant": _map_schema(
-        "Breaks, mends or loads plants.",
-        {
-            **section("What happens to the plant.", {name: _of_plant(verb) for name, verb in VERBS.items()}),
-            "minProperties": 1,
-        },
+        "Breaks, mends or loads plants, splices their rolls.", _work("What happens to the plant.", PLANT_VERBS)
+    ),
+    "web": _map_schema(
+        "Breaks, threads or changes webs.",
+        either(
+            "What happens to the web.",
+            words("It takes no value.", [name for name, verb in WEB_VERBS.items() if verb.is_alone]),
+            _work("What happens to the web, with its value.", WEB_VERBS),
+        ),
     ),
 }
 """The values that each verb accepts."""

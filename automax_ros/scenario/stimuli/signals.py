@@ -12,6 +12,7 @@ from automax_ros.core.types import DataType, Value
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER
+from automax_ros.rackfile.reading.scale import Scale
 from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 
 
@@ -22,6 +23,7 @@ class Signal:
     ``label`` is its full name; ``length`` is the most characters of a STRING; ``low`` and ``high`` are the limits of a
     number. ``set`` and ``write`` accept a value of its type within them. ``set`` acts as an operator: it raises
     OperationRefused if that is not possible now. ``write`` acts as an instrument: on a forced signal it does nothing.
+    ``scale`` says what its counts mean, None where nothing does; ``unit`` what its number is in, "" where nothing does.
     """
 
     label: str
@@ -32,6 +34,8 @@ class Signal:
     read: Callable[[], Value]
     set: Callable[[Value], None]
     write: Callable[[Value], None]
+    scale: Scale | None = None
+    unit: str = ""
 
 
 class Signals(Protocol):
@@ -71,6 +75,8 @@ class RackSignals:
             partial(self.rack.memory.read_now, view, meant.index),
             partial(self.rack.adjust.write, meant),
             partial(self._write, meant, view),
+            variable.scale,
+            variable.unit,
         )
 
     def _write(self, meant: CommonElement, view: int, value: Value) -> None:

@@ -130,7 +130,7 @@ def time_of(node: Node, what: str, findings: ProblemList) -> int | None:
         return None
 
 
-VALUE_VERBS = ("set", "ramp", "sine", "square")
+VALUE_VERBS = ("set", "ramp", "sine", "square", "table")
 LEAST_HZ = 0.0001
 """Lowest frequency (decision: slower is a ramp)."""
 

@@ -1,4 +1,4 @@
-"""Shapes of signals over time: ramp, sine, square. Pure functions of the time since their start.
+"""Shapes of signals over time: ramp, sine, square, course. Pure functions of the time since their start.
 
 All are sampled at their start and each ms after it (decision: the contract says 1 ms for ramps). A ramp also has a
 sample at its end; a sine and a square end before theirs, so that a square of whole periods leaves its low value.
@@ -7,11 +7,13 @@ sample at its end; a sine and a square end before theirs, so that a square of wh
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from automax_ros.core.numbers import stored_real
+from automax_ros.core.numbers import nearest, stored_real
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import DataType, Value
 
@@ -73,7 +75,7 @@ class Sine:
         """Return the sample; the phase is exact however long the wave lasts."""
         phase = self.hz * elapsed_ns / NS_PER_S % 1
         exact = self.mean + self.amplitude * math.sin(2.0 * math.pi * float(phase))
-        return math.floor(exact + 0.5) if self.type.is_integer else stored_real(exact)[0]
+        return nearest(exact) if self.type.is_integer else stored_real(exact)[0]
 
     def last(self) -> Value | None:
         """Return None: the last sample stays."""
@@ -97,3 +99,34 @@ class Square:
     def last(self) -> Value | None:
         """Return None: the last sample stays."""
         return None
+
+
+@dataclass(frozen=True)
+class Course:
+    """Straight lines between points: ``values`` at ``times_ns``, which ascend; whole numbers are rounded as a ramp's.
+
+    Before the first point it is the value at the start. Of points of one time the last counts, so they are a step.
+    """
+
+    type: DataType
+    times_ns: Sequence[int]
+    values: Sequence[float]
+
+    @property
+    def for_ns(self) -> int | None:
+        """The time of the last point."""
+        return self.times_ns[-1]
+
+    def value(self, elapsed_ns: int, start: Value) -> Value:
+        """Return the point of the line."""
+        after = bisect_right(self.times_ns, elapsed_ns)
+        if after == 0:
+            return start
+        if after == len(self.times_ns):
+            return self.last()
+        since_ns, span_ns = elapsed_ns - self.times_ns[after - 1], self.times_ns[after] - self.times_ns[after - 1]
+        return Ramp(self.type, self.values[after], span_ns).value(since_ns, self.values[after - 1])
+
+    def last(self) -> Value:
+        """Return the last point."""
+        return int(self.values[-1]) if self.type.is_integer else self.values[-1]

@@ -68,6 +68,11 @@ def test_controls_take_the_words_of_stimuli(action):
         assert asked(action, *words) == [{"name": words[0], "control": words[1], "value": value}]
 
 
+def test_a_web_that_is_broken_takes_no_value():
+    assert asked("web", "W1", "break") == [{"name": "W1", "control": "break", "value": ""}]
+    assert asked("web", "W1", "stiffness_n", "1.5e5") == [{"name": "W1", "control": "stiffness_n", "value": "1.5e5"}]
+
+
 def test_steps_and_power_are_asked_for_as_the_services_take_them():
     assert asked("step") == [{"what": "scan", "task": "", "count": 1}]
     assert asked("step", "tick", "SPEED", "--count", "3") == [{"what": "tick", "task": "SPEED", "count": 3}]
@@ -87,6 +92,7 @@ def test_every_action_asks_a_service_with_fields_that_it_has(name, tmp_path):
         "reload": ("T", str(tmp_path / "T.BLK")),
         "plant": ("UNWIND", "repair", "all"),
         "module": ("7", "test_switch", "A"),
+        "web": ("W1", "break"),
         "power": ("on",),
         "lifecycle": ("activate",),
         "press": ("A@",),

@@ -79,6 +79,8 @@ def test_a_point_that_the_module_does_not_have_is_told(plant):
         (["LINE1.CNF", "--module", "57C419"], "'57C419' is not a slot and a module"),
         (["LINE1.CNF", "--module", "16=57C419"], "'16=57C419' is not a slot and a module"),
         (["LINE1.CNF", "--module", "5=57C999"], "the emulator has no such module"),
+        (["LINE1.CNF", "--part", "5=57C419"], "--part is for the folder of a disk, and LINE1.CNF is not a folder"),
+        (["LINE1.CNF", "--headers"], "--headers is for the folder of a disk"),
         (["LINE1.CNF", "--output", "there.yaml"], "there.yaml exists already"),
         (["LINE1.CNF", "--output", "rack.txt"], "a rack file ends in .yaml or .yml"),
     ],

@@ -271,3 +271,15 @@ def test_tasks_of_other_ticks_have_a_udc_of_their_own(automax):
     assert [(item.slot, [task.name for task in item.tasks]) for item in modules if item.model == "57552"] == [
         (3, ["WIND_A"]), (4, ["WIND_B"])
     ]  # fmt: skip
+
+
+def test_a_task_that_only_the_user_knows_to_be_a_udcs_stands_on_one(automax):
+    """No block of it says so: it turns the common clock on and limits a reference."""
+    (automax.folder / "plant").mkdir()
+    automax.write("plant/LINE.BLK", "10 COMMON REF%\n20 CALL SCAN_LOOP(TICKS=4)\n30 END\n")
+    automax.write("plant/WIND_A.BLK", "10 COMMON REF%, OUT%\n20 CALL SCAN_LOOP(TICKS=4)\n30 OUT% = REF%\n40 END\n")
+    assert automax("new", "plant", "--udc", "wind_a").code == 0
+    tasks = {task.name: module.model for module, task in load("plant/rack.yaml").config.placed_tasks}
+    assert tasks == {"LINE": "57C435", "WIND_A": "57552"}
+    result = automax("new", "plant", "--udc", "WIND_B", "--force")
+    assert (result.code, "plant holds no task 'WIND_B' for a UDC" in result.err) == (2, True)

@@ -41,7 +41,8 @@ def run(ros_domain_id, plan, stop):
     process = RosProcess()
     made = LifecycleRunner(LifecycleRun("operated", lambda: plan, plan), process, stop, ros_domain_id)
     yield made
-    made.close()
+    made.finish()
+    made.leave()
     process.close()
 
 
@@ -97,7 +98,7 @@ def test_what_cannot_even_be_stopped_ends_the_program(run, monkeypatch):
         raise ZeroDivisionError("a bug")
 
     monkeypatch.setattr(LiveSession, "start", broken)
-    monkeypatch.setattr(LiveSession, "close", broken)
+    monkeypatch.setattr(LiveSession, "finish", broken)
     assert isinstance(change(run, "activate"), ZeroDivisionError)
     assert run._node.state == FINALIZED
     run.run()

@@ -423,7 +423,7 @@ def test_a_value_is_shown_by_its_scale_and_with_its_unit(automax, capsys):
     config = config_at(automax.write("rack.yaml", rack))
     rack = Rack(config)
     rack.start([("P%", 1000), ("D%", 7)])
-    StatusDisplay(rack, watched(config, None), live=False).finish(None)
+    StatusDisplay(rack, watched(config, None), live=False).finish()
     assert "P%=2.442 bar  D%=7 fpm  A%=0\n" in capsys.readouterr().out
 
 
@@ -442,7 +442,7 @@ def test_the_example_that_make_run_runs_shows_the_motor(automax):
 def test_text_of_a_string_cannot_drive_the_terminal(rack, capsys):
     display = StatusDisplay(rack, watched(rack.config, ["NOTE$"]), live=False)
     rack.start([("NOTE$", "\x1b[2Jx\r\n")])
-    display.finish(None)
+    display.finish()
     assert "NOTE$=\N{REPLACEMENT CHARACTER}[2Jx" in capsys.readouterr().out
 
 

@@ -252,3 +252,13 @@ def test_a_run_that_cannot_begin_without_a_process_ends_with_it():
     with Supervised(*posts, ProcessSpec("recorder", program("sys.exit(2)"), reports=False, begins_run=True)) as run:
         run.ended()
     assert run.supervisor.codes["recorder"] == 2
+
+
+def test_a_process_that_does_not_end_is_killed_and_named(monkeypatch):
+    monkeypatch.setattr("automax_ros.cli.run.supervisor.END_NS", NS_PER_S)
+    deaf = "signal.signal(signal.SIGTERM, signal.SIG_IGN)\nprint('up', flush=True)\ntime.sleep(600)"
+    with Supervised(ProcessSpec("deaf", program(deaf)), ProcessSpec("one", program(WAITS + REPORT))) as run:
+        run.heard.until(lambda heard: len(heard.said) == 2)
+        run.stop()
+    assert run.heard.errors == [("deaf", "still runs 1.8 s after the run was asked to end: it is killed")]
+    assert run.supervisor.codes == {"deaf": -signal.SIGKILL, "one": 0}

@@ -37,7 +37,7 @@ def completed(*words: str) -> set[str]:
     ("words", "offered"),
     [
         (["sche"], {"schema"}),
-        (["re"], {"record", "replay", "report", "response"}),
+        (["re"], {"record", "replay", "report", "rerun", "response"}),
         (["schema", ""], {"rack", "stimuli", "-h", "--help"}),
         (["run", "x.yaml", "--simu"], {"--simulated"}),
         (["bag", ""], {"info", "repair", "-h", "--help"}),

@@ -94,3 +94,19 @@ def test_wrong_usage_writes_nothing(automax, old, arguments, message):
     assert (result.code, message in result.err) == (2, True)
     assert (automax.folder / old).read_bytes() == OLD
     assert not list((automax.folder / "b").iterdir())
+
+
+def test_an_include_file_is_written_into_its_task_and_check_names_convert(automax):
+    automax.write("HEAD.INC", "LOCAL X%\r\n")
+    automax.write("TASK.BLK", "10 INCLUDE HEAD\n20 CALL SCAN_LOOP(TICKS=4)\n30 X% = 1\n40 END\n")
+    assert "`automax convert` does it with an include file next to the task" in automax("check", "TASK.BLK").out
+    result = automax("convert", "TASK.BLK", "--output", "new")
+    assert (result.code, "TASK.BLK: HEAD.INC written in place of its INCLUDE" in result.err) == (0, True)
+    assert (automax.folder / "new" / "TASK.BLK").read_text().splitlines()[:2] == [
+        "10 ! INCLUDE HEAD.INC",
+        "11 LOCAL X%",
+    ]
+    automax.write("TASK.BLK", "10 INCLUDE NIL\n20 CALL SCAN_LOOP(TICKS=4)\n40 END\n")
+    result = automax("convert", "TASK.BLK")
+    assert "TASK.BLK: line 10 includes 'NIL.INC': it is not next to the task\n" in result.err
+    assert result.code == 1

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.cli.main import main
 from automax_ros.cli.options.task import TaskTarget, check_task_file
-from automax_ros.cli.output.csv_input import MAX_LINE, CsvFault
-from automax_ros.cli.tasks.trace import InputTable
+from automax_ros.cli.tasks.input_table import InputTable
 from automax_ros.core.problems import PROBLEMS
+from automax_ros.rackfile.reading.csv_table import MAX_LINE, CsvFault
 from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 from cli.support import TASK, table_of
 
@@ -29,7 +29,6 @@ FAULTS = [code for code in PROBLEMS if "AMX6910" <= code < "AMX6950"]
         ("REF\n", "1: error[AMX6911]", "did you mean REF%?"),
         ("REF%\tRUN@\n", "1: error[AMX6911]", "columns are separated by commas or semicolons"),
         ("REF%;RUN@\n1;1\n1,1\n", "3: error[AMX6914]", "1 cells, the header 2"),
-        ("time_s,TIME_S\n", "1: error[AMX6911]", "no variable 'TIME_S'"),
         ("time_s,time_s\n", "1: error[AMX6911]", "no variable 'time_s'"),
         ("GRID%(1,2)\n", "1: error[AMX6911]", 'needs quotes in a CSV table: "TABLE%(1,2)"'),
         ("REF%,\n", "1: error[AMX6911]", "no variable ''"),

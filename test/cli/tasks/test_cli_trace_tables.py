@@ -80,3 +80,34 @@ def test_exported_scans_are_traced_again(automax):
         assert traced[name] == [row[f"out.{name}"] for row in rows], name
     assert traced["LAST%"] == [row["local.LAST%"] for row in rows]
     assert len(set(traced["LAST%"])) > 20
+
+
+def test_a_historians_table_is_rounded_and_its_other_columns_are_named(automax):
+    """Rounded as by the verb `table`: halves up. Scans come every 11 ms."""
+    automax.write("HOLD.BLK", HOLD)
+    automax.write("IN.csv", "time_s,REF%,comment,X%\n5,166.3,a,1\n5.011,2.5,,\n5.022,-2.5,,\n5.033,-1.6,c,2\n")
+    result = automax("trace", "HOLD.BLK", "--input", "IN.csv")
+    assert (result.code, result.err) == (0, "HOLD: it has no variable for these columns of IN.csv: comment, X%\n")
+    assert columns_of(result.out)["OUT%"] == ["166", "3", "-2", "-2"]
+    automax.write("IN.csv", "REF%,comment\n1,a\n")
+    assert "AMX6911" in automax("trace", "HOLD.BLK", "--input", "IN.csv").err, "by scans it is not a historian's"
+    automax.write("IN.csv", "time_s,REF%\n5,32767.4\n")
+    assert "it must be a number from -32768 to 32767" in automax("trace", "HOLD.BLK", "--input", "IN.csv").err
+
+
+def test_a_file_that_an_error_cuts_short_is_named(automax):
+    automax.write("HOLD.BLK", HOLD)
+    automax.write("IN.csv", "time_s,REF%\n0,1\n0.1,Bad Input\n")
+    result = automax("trace", "HOLD.BLK", "--input", "IN.csv", "--output", "OUT.csv")
+    assert result.code == 2
+    rows = (automax.folder / "OUT.csv").read_text().splitlines()[1:]
+    assert result.err.startswith(f"OUT.csv: cut short after {len(rows)} scans by the error that follows\nIN.csv:3: ")
+    assert result.err.endswith("hint: leave the cell empty where there is no value\n")
+    assert len(rows) == 10
+
+
+def test_two_decimal_signs_and_dates_are_refused(automax):
+    told = automax.trace("time_s;REF%\n0;1,4\n0,02;1.500\n", task=HOLD).err
+    assert "AMX6915" in told
+    assert "the decimal sign is a comma in line 2, and here a dot" in told
+    assert "docs/howto/week.md" in automax.trace("time_s,REF%\n2026-03-02,1\n", task=HOLD).err

@@ -107,3 +107,28 @@ def test_what_stands_before_scan_loop_sees_the_entries_of_0(automax):
     assert (result.code, result.err) == (0, "")
     columns = columns_of(result.out)
     assert (columns["SEEN%"], columns["GAIN"], columns["REF%"]) == (["37", "37"], ["2.5", "2.5"], ["7", "8"])
+
+
+def test_a_historians_table_drives_a_task_alone(automax, trace):
+    """TASK scans at 0, 11 ms, 22 ms ...; the rows hold, numbers go in lines with `linear`, and GAIN has its limits."""
+    automax.write("shift.csv", "t,ref,gain\n50,0,1\n50.022,22,2\n50.044,22,3\n")
+    entry = "- {{at: 0, table: {{file: shift.csv, time: t, columns: {{REF%: ref, GAIN: gain}}, hold: {}}}}}\n"
+    held = columns_of(trace(entry.format("true"), "--watch", "REF%,GAIN").out)
+    assert (held["REF%"], held["GAIN"]) == (["0", "0", "22", "22", "22"], ["1.0", "1.0", "2.0", "2.0", "3.0"])
+    lines = columns_of(trace(entry.format("linear"), "--watch", "REF%,GAIN").out)
+    assert (lines["REF%"], lines["GAIN"]) == (["0", "11", "22", "22", "22"], ["1.0", "1.5", "2.0", "2.5", "3.0"])
+    automax.write("shift.csv", "t,ref,gain\n50,0,11\n")
+    told = trace(entry.format("true")).err
+    assert "shift.csv:2: column 'gain': '11' cannot be used: GAIN takes a number from 0.0 to 10.0" in told
+    automax.write("outside.csv", "t,ref,gain\n0,0,1\n")
+    outside = trace(entry.format("true").replace("shift", "../outside"))
+    assert "lies outside the folder of the stimuli file" in outside.err
+
+
+def test_inputs_that_neither_table_nor_stimuli_set_are_named(automax, trace):
+    automax.write("IN.csv", "REF%\n1\n")
+    told = trace("- {at: 0, set: {RUN@: true}}\n", "--input", "IN.csv").err
+    assert told == ""
+    automax.write("IN.csv", "RUN@\n1\n")
+    assert "TASK: IN.csv does not set REF%: it stays 0" in trace("[]\n", "--input", "IN.csv").err
+    assert trace("- {at: 0, set: {REF%: 1}}\n", "--input", "IN.csv").err == ""

@@ -107,7 +107,7 @@ def test_the_summary_of_a_live_run_shows_it(tmp_path, capsys):
     Hand(rack).arm(0)
     rack.scheduler.run_due(1_200_000)
     for live in (True, False):
-        StatusDisplay(rack, (), live=live).finish(None)
+        StatusDisplay(rack, (), live=live).finish()
         shown = "drive_7: 1 interrupt, 1 later than 1 ms, the latest by 1.2 ms" in capsys.readouterr().out
         assert shown is live
 

@@ -91,6 +91,13 @@ def test_two_joints_of_one_name_are_refused(tmp_path: Path):
     assert found.code == "AMX6310"
 
 
+def test_a_roller_is_a_joint_too(tmp_path: Path):
+    found = loaded(tmp_path, text("name: REEL_roll", ", roller: {diameter_m: 0.5}")).diagnostics
+    assert ("AMX6310", "the joint of plant WINDER is called REEL_roll, and so is that of the roll of plant REEL") in [
+        (item.code, item.message) for item in found
+    ]
+
+
 def test_a_plant_without_a_motor_has_no_joint(tmp_path: Path):
     found = loaded(tmp_path, text("").replace("motor: dc_150hp_500v, ", "")).diagnostics
     assert [item.code for item in found] == ["AMX6009"]

@@ -7,13 +7,9 @@ from typing import Any
 
 import pytest
 
-from automax_ros.messages.cdr.cdr import decode
 from automax_ros.messages.stream.stream import RackStream
-from automax_ros.messages.types.rack_files import files_of
 from automax_ros.rack.rack import Rack
 from automax_ros.recordings.info.info import bag_info
-from automax_ros.recordings.live.recording import LiveRecording
-from automax_ros.recordings.live.topics import LiveTopics
 from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.playback import survey
 from automax_ros.recordings.read.reader import BagReader
@@ -21,6 +17,7 @@ from automax_ros.recordings.tables.export import CommonTable, write_csv
 from automax_ros.recordings.tables.traces import traces
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.replay.engine import replay
+from recordings.live.from_outside import check_recorded_outside
 from recordings.live_racks import YAML, build
 
 PLANTS = """\
@@ -81,35 +78,10 @@ def test_recording_holds_plants_and_is_the_same_each_time(tmp_path: Path) -> Non
 
 
 def test_recorder_outside_takes_plants_that_the_graph_offers(tmp_path: Path) -> None:
-    rack = rack_of(tmp_path / "rack")
-    stream = RackStream(rack, 4711)
-    sent: list[tuple[str, bytes]] = []
-    stream.add_sink(lambda topic: lambda _, payload: sent.append((topic.name, payload)))
-    stream.begin(1_700_000_000_000_000_000)
-    rack.start()
-    rack.run(0.0951)
-    stream.end()
-    table = next(payload for topic, payload in sent if topic == "/line1/variables")
-    facts: Any = decode("automax_msgs/msg/VariableTable", table)
-    assert not LiveTopics("/line1", facts).plants
-    topics = LiveTopics("/line1", facts, OFFERED)
+    bag, _, topics = check_recorded_outside(tmp_path, rack_of(tmp_path / "rack"), lambda _: OFFERED, (STATES, JOINTS))
     assert list(topics.plants) == [STATES, JOINTS]
-    recording = LiveRecording(tmp_path / "bag", topics, table, files_of(rack))
-    for number, (topic, payload) in enumerate(sent):
-        recording.take(topic, (number + 1) * 50_000, payload)
-    for topic in (STATES, JOINTS):
-        recording.take(topic, len(sent) * 50_000, b"\x00\x01\x00\x00 no message")
-    recording.close()
-    assert recording.failure is None
-    assert recording.malformed == 2
-    for topic in (STATES, JOINTS):
-        found = [payload for name, payload in sent if name == topic]
-        stored = [record.data for record in BagReader(tmp_path / "bag").records() if record.channel.topic == topic]
-        assert stored == found
-        assert len(stored) == 10
-    stamps = [item.stamp for item in decoded(tmp_path / "bag", STATES)]
+    stamps = [item.stamp for item in decoded(bag, STATES)]
     assert stamps == [1_700_000_000_000_000_000 + number * 10_000_000 for number in range(10)]
-    assert replay(tmp_path / "bag").identical
 
 
 def test_signals_are_columns_of_exports_and_lines_of_pictures(tmp_path: Path) -> None:

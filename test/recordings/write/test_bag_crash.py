@@ -33,7 +33,7 @@ ROOT = Path(__file__).parents[3]
 RACK = ROOT / "config" / "section_drive" / "rack.yaml"
 PERIOD_NS = 11 * NS_PER_MS
 """Of the rack's fastest task: between two of its scans nothing can be lost."""
-QUICK, ALL = 5, 50
+QUICK, ALL = 3, 50
 OPTIONS = (
     ["--record-compression", "zstd"],
     ["--record-compression", "lz4", "--record-split-mb", "0.1"],

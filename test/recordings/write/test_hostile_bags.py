@@ -19,7 +19,7 @@ from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 from recordings.live_racks import build
 
 ROOT = Path(__file__).parents[3]
-MUTANTS = 220
+MUTANTS = 110
 MEMORY_MB = 500
 COMMANDS = {"export", "bag repair", "bag info", "replay"}
 

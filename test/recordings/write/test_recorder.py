@@ -163,6 +163,7 @@ def test_the_recording_of_a_rack_that_never_started_is_readable(tmp_path):
     rack = build(tmp_path)
     recorder = Recorder(rack, RackStream(rack, rack.fingerprint), tmp_path / "bag")
     recorder.close()
+    assert (recorder.has_tasks, recorder.scans) == (True, 0)
     reader = BagReader(tmp_path / "bag")
     names = [type(entry.message).__name__ for entry in reader.messages()]
     assert names[:2] == ["VariableTable", "CommonImage"]
@@ -172,6 +173,21 @@ def test_the_recording_of_a_rack_that_never_started_is_readable(tmp_path):
     assert fault.code == "AMX6832"
     with pytest.raises(BagError, match="AMX6832"):
         replay(tmp_path / "bag")
+
+
+def test_what_tasks_do_before_their_first_scan_counts_as_a_scan(tmp_path):
+    """A chance failure: of a run that ended after it the program said that nothing can be replayed."""
+    rack = build(tmp_path)
+    stream = RackStream(rack, rack.fingerprint)
+    recorder = Recorder(rack, stream, tmp_path / "bag")
+    stream.begin()
+    rack.start()
+    stream.end()
+    recorder.close()
+    assert not any(item.scans for item in rack.statistics.values())
+    assert recorder.scans == len(rack.tasks) == 2
+    assert verdict_of(BagReader(tmp_path / "bag")).fault is None
+    assert replay(tmp_path / "bag").identical
 
 
 def test_existing_folder_is_refused(tmp_path):

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from functools import partial
 
 import pytest
+from messages.stream.webs import web_rack
 from rack.distributed.parts import PROCESS_SLOTS, config_in
 from waiting import wait_until
 
@@ -19,20 +20,20 @@ RUN_ID = 77
 
 
 @contextmanager
-def running(folder, **layout_fields):
-    """Three processes' parts of a rack, each on a thread of its own here, begun as it hears of the start."""
+def running(folder, config=None, processes=PROCESS_SLOTS, **layout_fields):
+    """The parts of a rack's processes, each on a thread of its own here, begun as it hears of the start."""
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
 
     from automax_ros.ros.distributed.bus import ProcessLayout
     from automax_ros.ros.rack_nodes import RackNodes
 
-    config = config_in(folder)
+    config = config or config_in(folder)
     context = Context()
     context.init(args=["--ros-args", "--disable-stdout-logs"])
     executor = SingleThreadedExecutor(context=context)
-    layout = ProcessLayout(PROCESS_SLOTS, RUN_ID, **layout_fields)
-    parts = [RackNodes(Rack(config, local=s), context=context, process_layout=layout) for s in PROCESS_SLOTS]
+    layout = ProcessLayout(processes, RUN_ID, **layout_fields)
+    parts = [RackNodes(Rack(config, local=s), context=context, process_layout=layout) for s in processes]
     for part in parts:
         part.add_to(executor)
     waiting = list(parts)
@@ -56,6 +57,12 @@ def racks(tmp_path, ros_domain_id):
 
 @pytest.fixture
 def ask(racks):
+    with asking(racks, "/cut1") as found:
+        yield found
+
+
+@contextmanager
+def asking(racks, space):
     """Ask a service of the rack: by its name and the fields of the request."""
     import threading
 
@@ -77,7 +84,7 @@ def ask(racks):
     def call(client, kind, service, **fields):
         return client.call(kinds[kind], service, kinds[kind].Request(**fields), PATIENCE_NS)
 
-    with RackClient("/cut1") as client:
+    with RackClient(space) as client:
         client.find(PATIENCE_NS)
         yield partial(call, client)
     ended.set()
@@ -223,3 +230,20 @@ def test_the_table_of_tasks_is_that_of_all_processes(ask, racks):
         assert all(len({item.slot in (2, 10) for item in told.tasks}) <= 1 for told in statistics)
         racks["parts"][2].close()
         client.until(lambda: shown() == whole[:1], "the table without the process that has ended")
+
+
+@pytest.mark.usefixtures("ros_domain_id")
+def test_what_is_done_to_a_web_is_done_where_its_plants_are(tmp_path):
+    """Of PULL, which no drive turns, too: a web holds it to the plants of the other process."""
+    config = web_rack(tmp_path).config
+    with running(tmp_path, config, ((0,), (7, 10))) as racks, asking(racks, "/line1") as ask:
+        home, line = (part.rack for part in racks["parts"])
+        assert (list(home.plants.webs), list(line.plants.webs)) == ([], ["W1", "W2"])
+        assert ask("OperateControl", "web", name="W2", control="break", value="").ok
+        assert line.plants.webs["W2"].broken
+        assert ask("OperateControl", "plant", name="pull", control="slip", value="0.4").ok
+        assert line.plants["PULL"].notes == ["slip 0.4"]
+        refused = ask("OperateControl", "web", name="W9", control="break", value="")
+        assert (refused.ok, refused.reason) == (False, "the rack has no web 'W9': it has none")
+        senders = {topic.name: topic.plant for topic in racks["parts"][1].stream.webs.topics}
+        assert senders["/line1/rolls/PULL"] == "UNWIND"

@@ -1,6 +1,6 @@
 """The node of a plant over real DDS: its shaft and state, the load from ROS, faults and switches by services."""
 
-from math import pi
+from math import pi, remainder
 
 import pytest
 
@@ -49,8 +49,8 @@ def test_shafts_and_states_are_heard_and_ros_loads_a_shaft(live, client):
     passed_s = second.header.stamp.sec - first.header.stamp.sec
     passed_s += (second.header.stamp.nanosec - first.header.stamp.nanosec) * 1e-9
     assert passed_s == pytest.approx(0.01 * round(passed_s / 0.01))
-    turned = (second.position[0] - first.position[0]) % (2 * pi)
-    assert turned == pytest.approx(10 * pi * passed_s % (2 * pi), abs=1e-6)
+    turned = second.position[0] - first.position[0]
+    assert remainder(turned - 10 * pi * passed_s, 2 * pi) == pytest.approx(0.0, abs=1e-6)
     assert states[-1].load_nm == 0.0
     assert states[-1].speed_rpm == 0.0
     assert (states[-1].plant, states[-1].slot, states[-1].drive) == ("UNWIND", 7, "")
