@@ -13,6 +13,7 @@ from drive import LIM_BAR, inputs_of
 
 from automax_ros.drive.base.motor import __file__ as motor_file
 from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop.inputs import Inputs
 from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
 from automax_ros.drive.current_loop.signals import PERMISSIVE
 from automax_ros.drive.plant.controller import DriveController
@@ -43,17 +44,20 @@ def rate(names: tuple[str, ...], *, webs: bool) -> float:
         web = WebData(4.0, 2e5)
         spans = {f"W{place}": (names[place], names[place + 1], web) for place in range(len(names) - 1)}
         build_chains(plants, SURFACES, spans, {})
-    drives = [
-        (DriveController(plants[name]), CurrentMinorLoop(), inputs_of(REFERENCES[name])._replace(lim_bar=LIM_BAR))
-        for name in names
-    ]
+
+    def drive(name: str) -> tuple[DriveController, CurrentMinorLoop, dict[bool, Inputs]]:
+        inputs = inputs_of(REFERENCES[name])._replace(lim_bar=LIM_BAR)
+        by_run = {on: inputs._replace(cml_run=on) for on in (False, True)}
+        return DriveController(plants[name]), CurrentMinorLoop(), by_run
+
+    drives = [drive(name) for name in names]
     due = [number * 900_000 for number in range(len(drives))]
 
     def run(until_ns: int, *, on: bool = True) -> None:
         while (now := min(due)) < until_ns:
             place = due.index(now)
             hardware, minor, inputs = drives[place]
-            outcome = minor.scan(now, hardware.measure(now, PERMISSIVE), inputs._replace(cml_run=on))
+            outcome = minor.scan(now, hardware.measure(now, PERMISSIVE), inputs[on])
             hardware.command(outcome.command, now)
             due[place] = now + outcome.command.next_ns
 

@@ -1,4 +1,4 @@
-"""Tells what becomes of the webs of a running rack: they broke, ran out of their roll, or are threaded again."""
+"""Says what becomes of the webs of a running rack: they broke, ran out of their roll, or are threaded again."""
 
 from __future__ import annotations
 
