@@ -70,6 +70,8 @@ function greet() {
   const where = first ? `First difference: ${first.task}, scan ${first.scan}` : `No difference from ${label}`;
   write(parts.difference, where);
   parts.difference.title = first?.text ?? "";
+  const kept = Number(new URLSearchParams(location.search).get("at"));
+  if (kept) seek({ t: kept });
 }
 
 function keyed(event) {
@@ -106,8 +108,14 @@ async function step(by) {
 /** Shows the number of the scan once the position rests: the program executes the scan to answer. */
 function locate() {
   clearTimeout(settling);
-  const put = (number) => isTyping() || (parts.scan.value = number);
-  if (!plays()) settling = setTimeout(async () => put(await scanNow().catch(() => "")), SETTLED_MS);
+  if (!plays()) settling = setTimeout(settle, SETTLED_MS);
+}
+
+// The address keeps the position, in ns, for a reload and for somebody else with this recording.
+async function settle() {
+  history.replaceState(null, "", `?at=${now()}${location.hash}`);
+  const number = await scanNow().catch(() => "");
+  if (!isTyping()) parts.scan.value = number;
 }
 
 async function showDifference() {

@@ -99,6 +99,17 @@ def test_time_is_scrubbed_and_scans_are_stepped(bag):
     assert before != after
 
 
+def test_a_page_that_is_loaded_again_shows_the_same_time(bag):
+    show(bag, "diagram?task=SPEED")
+    bag.locator(".player input[type=range]").evaluate(
+        "node => { node.value = 800000; node.dispatchEvent(new Event('input')) }"
+    )
+    bag.wait_for_url(re.compile(r"\?at=8000000000#diagram"))
+    bag.reload()
+    shows(bag, ".player .time", "8.0000 s")
+    shows(bag, ".scan-at", "scan 72")
+
+
 def test_a_number_that_is_being_typed_is_not_replaced(bag):
     """The answer about the present scan may come between typing and Enter."""
     seek(bag, "SPEED", 300)
