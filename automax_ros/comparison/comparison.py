@@ -10,8 +10,9 @@ from automax_ros.comparison.align import Alignment, Event, aligned
 from automax_ros.comparison.courses import Course, RecordedCourses, all_names, read_courses
 from automax_ros.comparison.differences import Difference, difference
 from automax_ros.comparison.measures import BAND_PERCENT, Measures, Response, is_step_like, response, steady_before
+from automax_ros.comparison.signals import plain_name
 from automax_ros.core.text import count_of
-from automax_ros.core.ticks import NS_PER_S, seconds_text
+from automax_ros.core.ticks import NS_PER_S, seconds_text, time_text
 from automax_ros.core.types import DataType
 from automax_ros.core.user_error import UsageError
 from automax_ros.core.values import is_number, number
@@ -195,13 +196,9 @@ def _all_asked(named: Sequence[str], options: ComparisonOptions) -> list[str]:
     others = [*options.references, *(text for text in options.references.values() if not is_number(text))]
     if options.event is not None:
         others.append(options.event.variable)
-    known = {_plain(name): name for name in reversed(named)}
-    more = {_plain(name): name for name in reversed(others) if _plain(name) not in known}
+    known = {plain_name(name): name for name in reversed(named)}
+    more = {plain_name(name): name for name in reversed(others) if plain_name(name) not in known}
     return [*named, *reversed(more.values())]
-
-
-def _plain(name: str) -> str:
-    return "".join(name.upper().split()).replace("[", "(").replace("]", ")").replace("/", ".")
 
 
 def _half(progress: Progress, place: int) -> Progress:
@@ -216,10 +213,10 @@ def _compared(
     only: tuple[tuple[str, ...], tuple[str, ...]],
 ) -> Comparison:
     before, after, of_scales = _alike(before, after)
-    labels = {_plain(name): label for name, label in before.labels.items()}
+    labels = {plain_name(name): label for name, label in before.labels.items()}
     event = options.event
     if event is not None:
-        event = Event(labels[_plain(event.variable)], event.relation, event.value, event.text)
+        event = Event(labels[plain_name(event.variable)], event.relation, event.value, event.text)
         before, after = _by_label(before), _by_label(after)
     alignment = aligned(before, after, event, options.event_from_ns, options.shift_ns)
     moves = alignment.move_before_ns, alignment.move_after_ns
@@ -228,8 +225,8 @@ def _compared(
         label: (course.moved(moves[0]), after.courses[label].moved(moves[1]))
         for label, course in before.courses.items()
     }
-    references = {labels[_plain(name)]: text for name, text in options.references.items()}
-    shown = dict.fromkeys([*(labels[_plain(name)] for name in named), *references])
+    references = {labels[plain_name(name)]: text for name, text in options.references.items()}
+    shown = dict.fromkeys([*(labels[plain_name(name)] for name in named), *references])
     measured_ns = max(start_ns, 0) if event is not None else start_ns
     found: list[Compared] = []
     for label in shown:
@@ -238,11 +235,11 @@ def _compared(
         text = references.get(label, "")
         wanted: tuple[Course | float | None, Course | float | None] = (None, None)
         if text:
-            wanted = (number(text), number(text)) if is_number(text) else pairs[labels[_plain(text)]]
+            wanted = (number(text), number(text)) if is_number(text) else pairs[labels[plain_name(text)]]
         asked = bool(text) or options.variables is not None or differs is None or differs.first is not None
         responses = None
         if asked and one.variable.kind is not DataType.BOOLEAN:
-            name = text if not text or is_number(text) else labels[_plain(text)]
+            name = text if not text or is_number(text) else labels[plain_name(text)]
             begins = before.start_ns + moves[0], after.start_ns + moves[1]
             from_rest = before.start_ns == 0 == after.start_ns
             responses = _responses(
@@ -383,11 +380,6 @@ def _notes(before: RecordedCourses, after: RecordedCourses, moves: tuple[int, in
     if apart_ns:
         which = "before" if apart_ns > 0 else "after"
         yield f"the recording {which} ends {seconds_text(abs(apart_ns))} s earlier than the other one"
-
-
-def time_text(time_ns: int) -> str:
-    """Return a time of the common axis as seconds, exactly; one before its 0 is negative."""
-    return f"{'-' if time_ns < 0 else ''}{seconds_text(abs(time_ns))}"
 
 
 def summary(found: Comparison) -> str:

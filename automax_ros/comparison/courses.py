@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from automax_ros.comparison.signals import recorded_signals
+from automax_ros.comparison.signals import plain_name, recorded_signals
 from automax_ros.core.text import printable
 from automax_ros.core.types import DataType
 from automax_ros.core.user_error import UsageError
@@ -23,7 +23,8 @@ from automax_ros.recordings.write.recorder import EDITED
 from automax_ros.replay.scans.scales import recorded_scales, values_in_unit
 
 MOST_VALUES = 20_000_000
-"""Most values of one recording that are kept (decision: a bound on memory, 320 MB)."""
+"""Most values that are read of each recording (decision: a bound on memory, 320 MB; 800 MB for a moment where one
+variable has them all)."""
 _LONGEST = 500
 """Longest text of what was edited (decision)."""
 Times = NDArray[np.int64]
@@ -119,8 +120,8 @@ def read_courses(bag: Path, names: Sequence[str], progress: Progress | None = No
     """
     reader = BagReader(bag)
     edited = printable(reader.custom_data.get(EDITED, ""))[:_LONGEST]
-    signals = {name.replace("/", ".").upper(): name for name in recorded_signals(reader)}
-    asked = [signals.get("".join(name.upper().split()), name) for name in names]
+    signals = {plain_name(name): name for name in recorded_signals(reader)}
+    asked = [signals.get(plain_name(name), name) for name in names]
     series = Series(bag, asked, progress=progress)
     if len(series.columns) < len(names):
         raise UsageError(f"of {', '.join(names)[:200]} two are the same variable", "name each once")

@@ -17,6 +17,11 @@ _SIGNALS: Mapping[str, Collection[str]] = {
 """The signals in the messages of a type; the last part of their topic is the name of what they are of."""
 
 
+def plain_name(name: str) -> str:
+    """Return a variable's or signal's name as it is looked up: capitals, no blanks, round brackets, no slash."""
+    return "".join(name.upper().split()).replace("[", "(").replace("]", ")").replace("/", ".")
+
+
 def recorded_signals(reader: BagReader) -> list[str]:
     """Return the signals of a recording, such as ``UNWIND/speed_rpm`` and ``W1/tension_n``.
 

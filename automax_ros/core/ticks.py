@@ -74,6 +74,11 @@ def seconds_text(time_ns: int) -> str:
     return f"{whole}.{rest:09d}".rstrip("0").rstrip(".") if rest else str(whole)
 
 
+def time_text(time_ns: int) -> str:
+    """Return a time of an axis as seconds, exactly; one before its 0 is negative."""
+    return f"{'-' if time_ns < 0 else ''}{seconds_text(abs(time_ns))}"
+
+
 def _exact(number: float | str, what: str) -> Fraction:
     """Return a number exactly as written; a huge exponent is refused before it uses memory."""
     text = str(number).strip()

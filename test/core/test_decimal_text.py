@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.numbers import stored_real
-from automax_ros.core.ticks import seconds_text
+from automax_ros.core.ticks import seconds_text, time_text
 from automax_ros.core.values import real_text
 
 
@@ -19,6 +19,7 @@ from automax_ros.core.values import real_text
 )
 def test_seconds(time_ns, text):
     assert seconds_text(time_ns) == text
+    assert (time_text(time_ns), time_text(-time_ns)) == (text, f"-{text}" if time_ns else "0")
 
 
 @settings(deadline=None, derandomize=True)

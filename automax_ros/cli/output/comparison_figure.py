@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from automax_ros.cli.output.figure import DPI, new_figure, plain
+from automax_ros.cli.output.figure import DPI, new_figure, plain, stepped_points
 from automax_ros.comparison.comparison import Compared, Comparison, summary
 from automax_ros.comparison.courses import Times, Values
 from automax_ros.comparison.differences import both
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
-from automax_ros.recordings.tables.traces import thinned
 
 MOST_LANES = 12
 """Most variables in one picture (decision): more cannot be told apart."""
@@ -66,11 +65,11 @@ def _draw_values(axis: Any, item: Compared, found: Comparison, width_px: int) ->
         ("after", item.after, {"color": _AFTER, "linewidth": 1.2, "linestyle": (0, (6, 2))}),
     ):
         part = course.between(start_ns, end_ns)
-        points = _points(part.times, part.values, found, width_px)
+        points = _finite_points(part.times, part.values, found, width_px)
         axis.plot(*points, drawstyle="steps-post", label=label, gid=f"{item.name} {label}", **look)
     for label, course in zip(("reference", ""), item.references, strict=False):
         part = course.between(start_ns, end_ns)
-        points = _points(part.times, part.values, found, width_px)
+        points = _finite_points(part.times, part.values, found, width_px)
         axis.plot(
             *points, drawstyle="steps-post", color=_REFERENCE, linewidth=1.0, linestyle=(0, (1, 3)), label=label or None
         )
@@ -89,7 +88,7 @@ def _draw_values(axis: Any, item: Compared, found: Comparison, width_px: int) ->
 
 def _draw_difference(axis: Any, item: Compared, found: Comparison, width_px: int) -> None:
     times, one, two = both(item.before, item.after, *_ends(found))
-    xs, ys = _points(times, two - one, found, width_px)
+    xs, ys = _finite_points(times, two - one, found, width_px)
     axis.axhline(0.0, color="grey", linewidth=0.6)
     axis.fill_between(xs, 0.0, ys, step="post", color=_APART, alpha=0.2, linewidth=0)
     axis.plot(xs, ys, drawstyle="steps-post", color=_APART, linewidth=1.0, gid=f"{item.name} difference")
@@ -107,14 +106,9 @@ def _draw_difference(axis: Any, item: Compared, found: Comparison, width_px: int
     axis.grid(alpha=0.3)
 
 
-def _points(times: Times, values: Values, found: Comparison, width_px: int) -> tuple[list[float], list[float]]:
-    """Return the points of a stepped line: no more than can be seen, its last value held to the end."""
+def _finite_points(times: Times, values: Values, found: Comparison, width_px: int) -> tuple[list[float], list[float]]:
     finite = np.isfinite(values)
-    xs, ys = (part.tolist() for part in thinned(times[finite] / NS_PER_S, values[finite], width_px))
-    if xs and xs[-1] < found.end_s:
-        xs.append(found.end_s)
-        ys.append(ys[-1])
-    return xs, ys
+    return stepped_points(times[finite] / NS_PER_S, values[finite], found.end_s, width_px)
 
 
 def _ends(found: Comparison) -> tuple[int, int]:

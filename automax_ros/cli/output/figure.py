@@ -14,7 +14,7 @@ from automax_ros.core.safe_file import atomic_write
 from automax_ros.core.text import printable
 from automax_ros.core.types import DataType
 from automax_ros.core.user_error import UsageError
-from automax_ros.recordings.tables.traces import ErrorMark, Line, TraceRole, Traces, thinned
+from automax_ros.recordings.tables.traces import ErrorMark, Floats, Line, TraceRole, Traces, thinned
 
 DPI = 120
 _LINE_STYLES: tuple[Any, ...] = ("-", "--", (0, (2, 1)), "-.")
@@ -159,12 +159,11 @@ def _lanes(lines: Sequence[Line], separate: bool) -> list[list[Line]]:
     return list(lanes.values())
 
 
-def _points(line: Line, traces: Traces, width_px: int) -> tuple[list[float], list[float]]:
-    """Return the points of a stepped line: no more than can be seen, its last value held to the end."""
-    times, values = thinned(line.times, line.values, width_px)
-    xs, ys = times.tolist(), values.tolist()
-    if xs and xs[-1] < traces.end_s:
-        xs.append(traces.end_s)
+def stepped_points(times: Floats, values: Floats, end_s: float, width_px: int) -> tuple[list[float], list[float]]:
+    """Return the points of a stepped line over times in s: no more than can be seen, its last value held to the end."""
+    xs, ys = (part.tolist() for part in thinned(times, values, width_px))
+    if xs and xs[-1] < end_s:
+        xs.append(end_s)
         ys.append(ys[-1])
     return xs, ys
 
@@ -180,7 +179,7 @@ def _draw_analog(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int
         look = _ROLES.get(line.role, others)
         if line.role in roles[:number]:  # a second one of its kind has a colour of its own
             look = {**look, "color": others["color"]}
-        points = _points(line, traces, width_px)
+        points = stepped_points(line.times, line.values, traces.end_s, width_px)
         drawn += axis.plot(*points, drawstyle="steps-post", gid=line.variable.label, **look)
     labels = [f" {plain(line.variable.label)}" for line in lines]  # a name may begin with _, which legends leave out
     axis.legend(
@@ -197,7 +196,7 @@ def _draw_analog(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int
 
 def _draw_logic(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int) -> None:
     for row, line in enumerate(lines):
-        xs, ys = _points(line, traces, width_px)
+        xs, ys = stepped_points(line.times, line.values, traces.end_s, width_px)
         base = -row - _ROW_FILL / 2
         levels = [base + _ROW_FILL * (value != 0) for value in ys]
         axis.axhline(base, color="grey", linewidth=0.4, alpha=0.6)

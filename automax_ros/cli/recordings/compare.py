@@ -144,10 +144,12 @@ def _require_places(arguments: argparse.Namespace) -> None:
     """Refuse options that go wrong only after the work.
 
     Raises:
-        UsageError: a file cannot be written, or the range ends before it begins.
+        UsageError: a file cannot be written, the range ends before it begins, or --align-from lacks --align.
         BagError: a file belongs to a recording.
     """
     plot, page = arguments.plot, arguments.html
+    if arguments.align_from and arguments.align is None:
+        raise UsageError("--align-from is where --align EVENT begins to look", "give --align, or shift by --shift")
     if arguments.start is not None and arguments.end is not None and arguments.end < arguments.start:
         raise UsageError("--to lies before --from")
     if plot is not None:

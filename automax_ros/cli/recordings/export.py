@@ -2,13 +2,16 @@
 
 Without --scans: common memory, one row for each instant at which a watched variable changed, or every S seconds. With
 --scans TASK: one row for each scan of the task, with what it latched and what it wrote back. With --stimuli FILE: what
-operator, ROS and stimuli did, for `automax run --simulated --stimuli FILE`, which then gives the same run.
+operator, ROS and stimuli did, for `automax run --simulated --stimuli FILE`, which then gives the same run as far as
+verbs can say it.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from automax_ros.cli.options.values import (
@@ -19,7 +22,7 @@ from automax_ros.cli.options.values import (
     watch_list,
     window_of,
 )
-from automax_ros.cli.output.files import require_writable, write_text
+from automax_ros.cli.output.files import require_folder, require_writable, write_text
 from automax_ros.cli.output.screen import share_shown
 from automax_ros.cli.output.signals import ended_by_signals
 from automax_ros.core.safe_file import is_direct
@@ -42,7 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.yaml",
         help="write what came from outside as a stimuli file, and the sources of reloads into a folder next to it",
     )
-    parser.add_argument("--force", action="store_true", help="write over a stimuli file that is there")
+    parser.add_argument(
+        "--force", action="store_true", help="write over a stimuli file, or its sources, that are there"
+    )
     add_window_arguments(parser)
     add_grid_argument(parser)
 
@@ -74,29 +79,52 @@ def _write_stimuli(arguments: argparse.Namespace) -> int:
     from automax_ros.replay.rerun.stimuli_text import sources_folder, stimuli_text
 
     path, window = arguments.stimuli, window_of(arguments)
-    for option, given in (("--output", arguments.output), ("--watch", arguments.watch), ("--scans", arguments.scans)):
-        if given is not None:
-            raise UsageError(f"{option} is for a table, --stimuli for what came from outside", "one after the other")
+    for option in ("output", "watch", "scans", "every"):
+        if getattr(arguments, option) is not None:
+            raise UsageError(f"--{option} is for a table, --stimuli for what came from outside", "one after the other")
     if path.suffix.lower() not in (".yaml", ".yml") and not is_direct(path):
         raise UsageError(f"{path}: a stimuli file is written as .yaml", "name it FILE.yaml")
     require_another_file(arguments.bag, path)
     require_writable(path)
     if path.exists() and not is_direct(path) and not arguments.force:
-        raise UsageError(f"{path} exists already, and may have been edited", "--force writes over it")
+        raise _edited(path)
     with ended_by_signals(), share_shown("export") as progress:
-        config, outside = recorded_outside(arguments.bag, progress)
-    title = f"What came from outside in {arguments.bag.name}, rack {config.name}"
+        config, outside = recorded_outside(arguments.bag, progress, window.end_ns)
+    title = f"What came from outside in {Path(os.path.abspath(arguments.bag)).name}, rack {config.name}"
     folder = sources_folder(path)
     made = stimuli_text(
         arguments.bag, config, outside, title, folder=folder, from_ns=window.start_ns, to_ns=window.end_ns
     )
-    for name, text in made.sources.items():
-        (path.parent / folder).mkdir(exist_ok=True)
-        write_text(path.parent / folder / name, text)
+    if made.sources:
+        _write_sources(path, path.parent / folder, made.sources, over=arguments.force)
     write_text(path, made.text)
     if sys.stderr.isatty():
         print(f"{path}: {made.entries} entries", file=sys.stderr)
     return 0
+
+
+def _write_sources(stimuli: Path, folder: Path, sources: Mapping[str, str], *, over: bool) -> None:
+    """Write the sources that a stimuli file names into the folder next to it: all of them, or none.
+
+    Raises:
+        UsageError: they cannot be written, or one is there that is another, unless ``over``.
+    """
+    if is_direct(stimuli):
+        hint = "name a FILE.yaml, or a part without reloads with --from and --to"
+        raise UsageError(f"{stimuli}: the sources of reloads need a folder next to a stimuli file", hint)
+    require_folder("--stimuli", folder)
+    folder.mkdir(exist_ok=True)
+    texts = {folder / name: text for name, text in sources.items()}
+    for file, text in texts.items():
+        require_writable(file)
+        if not over and file.exists() and file.read_bytes() != text.encode():
+            raise _edited(file)
+    for file, text in texts.items():
+        write_text(file, text)
+
+
+def _edited(path: Path) -> UsageError:
+    return UsageError(f"{path} exists already, and may have been edited", "--force writes over it")
 
 
 def _write(arguments: argparse.Namespace, as_numpy: bool, progress: Progress) -> int:

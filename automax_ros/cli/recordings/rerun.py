@@ -30,7 +30,8 @@ from automax_ros.cli.output.signals import WorkInterrupted, stop_signals
 from automax_ros.core.user_error import UsageError
 from automax_ros.rack.tasks.installation import RackError
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.replay.rerun.rerun import Rerun, RerunOptions, RerunReport
+from automax_ros.replay.rerun.report import RerunReport
+from automax_ros.replay.rerun.rerun import Rerun, RerunOptions
 from automax_ros.replay.scans.stored_rack import SourceRefused
 
 _DEVIATES = "AMX6836"

@@ -160,9 +160,7 @@ class OutsidePlayer:
 
     def _tune(self, act: Tuned) -> None:
         try:
-            task = self.rack.task(act.task)
-            whole = task.compiled.program.symbols[act.name].type is not DataType.REAL
-            self.rack.tune(task, act.name, int(act.value) if whole else act.value)
+            self.rack.tune(self.rack.task(act.task), act.name, act.value)
         except KeyError as error:
             raise OperationRefused(f"there is no tunable {act.task}.{act.name}") from error
         except ValueError as error:

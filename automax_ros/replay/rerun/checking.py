@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import seconds_text
-from automax_ros.messages.cdr.cdr import CdrError, decode
-from automax_ros.messages.types.messages import NAMES, CommonWrite, Operation, Scan, TaskState
+from automax_ros.messages.cdr.cdr import CdrError, Message, decode
+from automax_ros.messages.types.messages import (
+    NAMES,
+    NO_VALUES,
+    CommonWrite,
+    Operation,
+    PlantState,
+    RollState,
+    Scan,
+    TaskState,
+    WebState,
+)
 from automax_ros.messages.types.topics import Take, Topic
 from automax_ros.rackfile.model.writers import PRESET_WRITER
 from automax_ros.recordings.mcap.mcap_file import RawMessage
@@ -18,6 +28,7 @@ from automax_ros.recordings.read.reader import BagReader
 _SCAN, _WRITE = NAMES[Scan], NAMES[CommonWrite]
 _MOST_WAITING = 200_000
 """Most messages of other topics that wait for theirs (decision: a bound on memory)."""
+_ENDED = "the recording has ended"
 
 
 @dataclass(frozen=True)
@@ -70,13 +81,9 @@ class RecordedCheck:
         if self.exact:
             record = next(self._records, None)
             if record is None:
-                self._deviate(stamp, f"the recording has ended, and {_words(type_name, payload)} comes")
+                self._deviate(stamp, f"{_ENDED}, and {_words(_decoded(type_name, payload))} comes")
             elif (record.channel.topic, record.publish_time, record.data) != (name, stamp, payload):
-                type_recorded = record.schema.name if record.schema else ""
-                recorded = _words(type_recorded, record.data)
-                self._deviate(
-                    min(stamp, record.publish_time), f"recorded is {recorded}, here comes {_words(type_name, payload)}"
-                )
+                self._deviate(min(stamp, record.publish_time), _apart(_recorded(record), _decoded(type_name, payload)))
             else:
                 self.compared += 1
             return
@@ -84,19 +91,29 @@ class RecordedCheck:
             return
         record = self._next(name)
         if record is None:
-            self._deviate(stamp, f"the recording has ended, and {_words(type_name, payload)} comes")
-        elif record.data != payload and _contents(type_name, record.data) != _contents(type_name, payload):
-            recorded = _words(type_name, record.data)
-            self._deviate(stamp, f"recorded is {recorded}, here comes {_words(type_name, payload)}")
+            lacks = f"the next {_MOST_WAITING} recorded messages are of other topics" if self._full else _ENDED
+            self._deviate(stamp, f"{lacks}, and {_words(_decoded(type_name, payload))} comes")
+        elif record.data != payload:
+            self._compare_contents(stamp, _recorded(record), _decoded(type_name, payload))
         else:
             self.compared += 1
 
+    def _compare_contents(self, stamp: int, recorded: Message | None, here: Message | None) -> None:
+        if _contents(recorded) == _contents(here):
+            self.compared += 1
+        else:
+            self._deviate(stamp, _apart(recorded, here, _contents))
+
+    @property
+    def _full(self) -> bool:
+        return sum(map(len, self._waiting.values())) >= _MOST_WAITING
+
     def _next(self, name: str) -> RawMessage | None:
-        """Return the next recorded message of a topic."""
+        """Return the next recorded message of a topic; None at the end, and where too many of others come before it."""
         queue = self._waiting.setdefault(name, deque())
         while not queue:
-            record = next(self._records, None)
-            if record is None or sum(map(len, self._waiting.values())) > _MOST_WAITING:
+            record = None if self._full else next(self._records, None)
+            if record is None:
                 return None
             kind = record.schema.name if record.schema else ""
             if kind in (_SCAN, _WRITE) and not _is_repeated(kind, record.data):
@@ -115,23 +132,46 @@ def _is_repeated(type_name: str, payload: bytes) -> bool:
     return isinstance(message, CommonWrite) and message.writer == PRESET_WRITER and message.kind == WriteKind.FORCE
 
 
-def _contents(type_name: str, payload: bytes) -> object:
-    message = _decoded(type_name, payload)
+def _contents(message: Message | None) -> Message | None:
+    """Return a scan or a write without what depends on the host, or on when a recorder joined."""
     if isinstance(message, Scan):
-        return message._replace(duration_ns=0, skipped=0, full=False, latched=None)  # type: ignore[arg-type]
+        return message._replace(duration_ns=0, skipped=0, full=False, latched=NO_VALUES)
     return message._replace(sequence=0, run_id=0) if isinstance(message, CommonWrite) else message
 
 
-def _decoded(type_name: str, payload: bytes) -> object:
+def _decoded(type_name: str, payload: bytes) -> Message | None:
     try:
         return decode(type_name, payload)
-    except CdrError:
+    except (CdrError, KeyError):
         return None
 
 
-def _words(type_name: str, payload: bytes) -> str:
+def _recorded(record: RawMessage) -> Message | None:
+    return _decoded(record.schema.name if record.schema else "", record.data)
+
+
+def _apart(
+    recorded: Message | None, here: Message | None, part: Callable[[Message | None], Message | None] = lambda it: it
+) -> str:
+    """Return in words how a message differs from the recorded one: it is another one, or its first field that differs.
+
+    ``part`` gives the part of a message that counts.
+    """
+    words = _words(here)
+    if type(recorded) is not type(here) or _words(recorded) != words:
+        return f"recorded is {_words(recorded)}, here comes {words}"
+    fields = getattr(here, "_fields", ())
+    for field, before, now in zip(fields, part(recorded) or (), part(here) or (), strict=True):
+        if repr(before) != repr(now):  # NaN has one repr
+            numbers = f" {before} is recorded, here it is {now}" if isinstance(now, int | float) else " differs"
+            return f"{words}: {field}{numbers}"
+    return f"{words} comes at another instant than in the recording"
+
+
+def _words(message: Message | None) -> str:
     """Return in words what a message is."""
-    message = _decoded(type_name, payload)
+    if message is None:
+        return "a message that cannot be read"
     if isinstance(message, Scan):
         return f"scan {message.scan} of task {message.task}"
     if isinstance(message, TaskState):
@@ -140,4 +180,8 @@ def _words(type_name: str, payload: bytes) -> str:
         return f"the operation {message.what} {message.task}".rstrip()
     if isinstance(message, CommonWrite):
         return f"write {message.sequence} of writer {message.writer}"
-    return f"a message {type_name.rpartition('/')[2]}"
+    if isinstance(message, PlantState | RollState):
+        return f"the {type(message).__name__} of {message.plant}"
+    if isinstance(message, WebState):
+        return f"the WebState of {message.web}"
+    return f"a {type(message).__name__}"

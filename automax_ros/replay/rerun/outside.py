@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriteKind, WriterKind
 from automax_ros.core.names import PREDEFINED, element_name
 from automax_ros.core.ticks import seconds_text
@@ -29,19 +28,21 @@ from automax_ros.messages.types.messages import (
     TaskState,
     VariableTable,
 )
-from automax_ros.messages.types.rack_files import RackFile
 from automax_ros.rackfile.model.config import RackConfig, Timing
+from automax_ros.rackfile.model.writers import OPERATOR_WRITER, ROS_WRITER
 from automax_ros.rackfile.modules.network import AREA, BROADCAST, MASTER, RECEIVED, NetworkConfig
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.read.reader import BagMessage, BagReader
+from automax_ros.recordings.read.reader import HOLD_NS, BagMessage, BagReader
 from automax_ros.recordings.read.run_facts import RunFacts, run_facts
 from automax_ros.recordings.write.recorder import STOCK
 from automax_ros.replay.rerun.causes import Causes
-from automax_ros.replay.rerun.events import Entry, Event, Operated, Order, Tuned, Written
+from automax_ros.replay.rerun.events import Act, Entry, Event, Operated, Order, Tuned, Written
+from automax_ros.replay.rerun.task_states import RecordedStates
 from automax_ros.replay.scans.commons import RecordedCommons
-from automax_ros.replay.scans.state import places_of
 from automax_ros.replay.scans.stored_rack import StoredRack, stored_rack
 
+MOST_EVENTS = 2_000_000
+"""Most events, and values that they wrote, of one recording (decision: a bound on memory, 1 GB)."""
 _TYPES = frozenset(NAMES[kind] for kind in (CommonImage, CommonWrite, Operation, Scan, TaskState, VariableTable))
 _FROM_OUTSIDE = frozenset({WriterKind.ROS, WriterKind.OPERATOR})
 _BY_ITSELF = frozenset({WriterKind.IO, WriterKind.PLANT})
@@ -59,7 +60,7 @@ class Outside:
         states: the states of tasks that were not as installed at the start, by task.
         forced: what was forced then: view, element, value.
         starting: the tasks that were put into RUN at the start, None for all.
-        begins_ns: time of the first message. ``ends_ns``: of the last one.
+        begins_ns: time of the first message. ``ends_ns``: of the last one that was read.
         tasks: the tasks whose scans are recorded. ``every_state``: each with its state.
         files: when each file but the first begins, and whether something of that instant came before.
         skipped: scans left out by a late host, and ``skipped_ns`` when the first was.
@@ -87,14 +88,16 @@ class Outside:
         return Counter(_word(event.act) for event in self.events) + Counter(operator=bool(self.settings))
 
 
-def _word(act: Written | Operated | Tuned) -> str:
+def _word(act: Act) -> str:
     if isinstance(act, Written):
-        return {1: "ros", 2: "operator"}.get(act.writer, "network")
+        return {ROS_WRITER: "ros", OPERATOR_WRITER: "operator"}.get(act.writer, "network")
     return "operations" if isinstance(act, Operated) else "tuned"
 
 
-def recorded_outside(bag: Path, progress: Callable[[float], None] | None = None) -> tuple[RackConfig, Outside]:
-    """Return the rack of a recording, and what came from outside in its run.
+def recorded_outside(
+    bag: Path, progress: Callable[[float], None] | None = None, to_ns: int | None = None
+) -> tuple[RackConfig, Outside]:
+    """Return the rack of a recording, and what came from outside in its run, up to a time of it (ns).
 
     Raises:
         BagError: as ``read_outside``.
@@ -105,23 +108,25 @@ def recorded_outside(bag: Path, progress: Callable[[float], None] | None = None)
     rack.check_table(facts.table)
     reader = reader.again()
     reader.on_progress = progress
-    return rack.config, read_outside(reader, rack, facts)
+    return rack.config, read_outside(reader, rack, facts, to_ns)
 
 
-def read_outside(reader: BagReader, rack: StoredRack, facts: RunFacts) -> Outside:
-    """Read a recording from end to end.
+def read_outside(reader: BagReader, rack: StoredRack, facts: RunFacts, to_ns: int | None = None) -> Outside:
+    """Read a recording to its end, or to a time of its run (ns).
 
     Raises:
-        BagError: it cannot be read, does not fit its rack file, or lacks the source of a reload (AMX6835).
+        BagError: it cannot be read, does not fit its rack file, lacks the source of a reload (AMX6835), or more came
+            from outside than ``MOST_EVENTS``.
     """
-    return _Reading(reader, rack, facts).read()
+    return _Reading(reader, rack, facts, to_ns).read()
 
 
 class _Reading:
     """One pass over a recording."""
 
-    def __init__(self, reader: BagReader, rack: StoredRack, facts: RunFacts) -> None:
+    def __init__(self, reader: BagReader, rack: StoredRack, facts: RunFacts, to_ns: int | None) -> None:
         self._reader, self._rack, self._bag = reader, rack, reader.path
+        self._to_ns, self._is_cut = to_ns, False
         self._origin = facts.table.stamp
         self._is_modeled = rack.config.execution is Timing.MODELED
         self._commons = RecordedCommons(self._bag, facts, rack.config)
@@ -131,15 +136,13 @@ class _Reading:
         self._networks = _networks(rack, facts)
         self._received: set[int] = set()
         self._network_events: list[tuple[int, int]] = []
-        self._sources = _sources_by_hash(rack)
-        self._tunables = _tunables(rack)
-        self._tuned: dict[str, dict[str, float]] = {}
-        self._replaced: set[str] = set()
+        self._task_states = RecordedStates(self._bag, rack)
         self._causes = Causes(self._commons, rack.config)
         self._waiting = {program.name for program in rack.programs() if program.events}
         self._freezable = _freezable(rack, self._commons)
         self._frozen: set[tuple[int, int]] = set()
         self._events: list[Event] = []
+        self._room = MOST_EVENTS
         self._reloads: dict[str, int] = {}
         self._settings: tuple[tuple[str, Value], ...] = ()
         self._states: dict[str, TaskState] = {}
@@ -163,29 +166,46 @@ class _Reading:
         """Read all messages."""
         for entry in self._reader.messages(types=_TYPES):
             self._take(entry)
+            self._is_cut = self._has_enough()
+            if self._is_cut:
+                break
         if self._reader.last_stamp is not None:
             self._last = max(self._last, self._reader.last_stamp - self._origin)
         for name, place in self._reloads.items():
-            raise self._lacks_source(name, self._events[place].at_ns)
+            raise self._task_states.lacks_source(name, self._events[place].at_ns)
         played = frozenset(module.slot for number, module in self._networks.items() if number in self._received)
         dropped = {place for place, number in self._network_events if number not in self._received}
-        tasks = frozenset(self._stated)
         return Outside(
-            tuple(event for place, event in enumerate(self._events) if place not in dropped),
+            tuple(event for place, event in enumerate(self._events) if place not in dropped and self._counts(event)),
             self._settings,
             self._states,
             tuple(self._forced),
             self._starting(),
             self._first or 0,
             self._last,
-            tasks,
-            self._scanned and self._states_follow and not self._owing,
+            frozenset(self._stated | self._began),
+            self._has_every_state(),
             tuple(self._files),
             self._skipped,
             self._skipped_ns,
             played,
             self._stock(),
         )
+
+    def _counts(self, event: Event) -> bool:
+        return self._to_ns is None or event.at_ns <= self._to_ns
+
+    def _has_enough(self) -> bool:
+        """Return whether no instant up to the end is to come, and it is known what AUTO RUN started."""
+        if self._to_ns is None or self._last <= self._to_ns + HOLD_NS or self._reloads:
+            return False
+        known = self._began | self._stated
+        return not self._rack.config.auto_run or not self._began or known.issuperset(self._rack.task_names)
+
+    def _has_every_state(self) -> bool:
+        """Return whether each scan has a state; where reading ended early that of the last one may still be to come."""
+        missing = any(not self._is_cut or end_ns < self._last for end_ns in self._owing.values())
+        return self._scanned and self._states_follow and not missing
 
     def _stock(self) -> Mapping[str, SavedState]:
         """Return what the rack found on its rolls and webs; whether it is possible is seen when it is put back."""
@@ -288,7 +308,7 @@ class _Reading:
         self._directly = False
         self._beyond_presets = self._wrote = True
         if message.ok and what in _REPLACES:
-            self._replaced.update([task] if task else self._rack.task_names)
+            self._task_states.replaced([task] if task else self._rack.task_names)
         if message.ok and ((what == "stop_all" and (message.detail or task)) or (what == "unforce" and task)):
             return  # a fault, or a local that a reload has released
         act = Operated(what, task, message.ok, message.reason, message.detail)
@@ -342,22 +362,18 @@ class _Reading:
         place = self._reloads.pop(name, None)
         if place is not None:
             event = self._events[place]
-            source = self._sources.get((name, state.source_hash))
-            if source is None:
-                raise self._lacks_source(name, event.at_ns)
             assert isinstance(event.act, Operated)
+            source = self._task_states.source(state, event.at_ns)
             self._events[place] = replace(event, act=replace(event.act, source=source))
-        places = places_of(self._bag, state, self._tunables.get(name, ()))
-        values = {tunable: state.value[at] for tunable, at in places.items()}
-        known = self._tuned.get(name)
-        if known is not None and name not in self._replaced:
-            for tunable, value in values.items():
-                if tunable in known and known[tunable] != value:
-                    self._add(now, Tuned(name, tunable, value))
-        self._replaced.discard(name)
-        self._tuned[name] = values
+        for tuned in self._task_states.tuned(state):
+            self._add(now, tuned)
 
-    def _add(self, now: int, act: Written | Operated | Tuned) -> None:
+    def _add(self, now: int, act: Act) -> None:
+        self._room -= 1 + (len(act.entries) + len(act.shown) if isinstance(act, Written) else 0)
+        if self._room < 0:
+            when = seconds_text(now)
+            what = f"has more than {MOST_EVENTS} events from outside, and values that they wrote, by {when} s"
+            raise BagError("AMX6814", self._bag, what, "end more than 1 s before that, with --to")
         if not now and not self._scanned:
             self._events.append(Event(now, act, Order.START))
         elif self._is_modeled and isinstance(act, Written) and self._frees(act, now):
@@ -385,14 +401,6 @@ class _Reading:
     def _label(self, entry: Entry) -> str:
         return element_name(self._variables[entry[0]], entry[1])
 
-    def _lacks_source(self, task: str, at_ns: int) -> BagError:
-        return BagError(
-            "AMX6835",
-            self._bag,
-            f"lacks the source with which task {task} was reloaded at {seconds_text(at_ns)} s",
-            "end before it with --to",
-        )
-
 
 def _networks(rack: StoredRack, facts: RunFacts) -> dict[int, NetworkConfig]:
     """Return the network modules by the ids under which they write."""
@@ -418,15 +426,3 @@ def _freezable(rack: StoredRack, commons: RecordedCommons) -> frozenset[tuple[in
         for interrupt in module.registers.interrupts
     )
     return frozenset().union(*found)
-
-
-def _sources_by_hash(rack: StoredRack) -> dict[tuple[str, str], SourceText]:
-    texts = {name: (source, *rack.later.get(name, ())) for name, source in rack.sources.items()}
-    return {(name, RackFile(name, text.text).sha256): text for name, sources in texts.items() for text in sources}
-
-
-def _tunables(rack: StoredRack) -> dict[str, tuple[str, ...]]:
-    return {
-        program.name: tuple(symbol.name for symbol in program.symbols.values() if symbol.tuning is not None)
-        for program in rack.programs()
-    }

@@ -19,7 +19,7 @@ from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms, NativeO
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.names import element_name
 from automax_ros.core.text import count_of, near_or_listed, printable, quoted
-from automax_ros.core.ticks import NS_PER_MS, NS_PER_S, seconds_text
+from automax_ros.core.ticks import NS_PER_MS, seconds_text
 from automax_ros.core.types import bare_name
 from automax_ros.core.user_error import UserError
 from automax_ros.core.values import source_text
@@ -28,7 +28,7 @@ from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.modules.network import NetworkModule
 from automax_ros.rack.rack import Rack, digest_of
-from automax_ros.rack.tasks.installation import Installation, RackError
+from automax_ros.rack.tasks.installation import Installation
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.value_names import TunableSetting, tunables_of, tuning
 from automax_ros.recordings.mcap.errors import BagError
@@ -37,9 +37,10 @@ from automax_ros.recordings.read.run_facts import run_facts
 from automax_ros.recordings.read.soundness import require_tasks
 from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 from automax_ros.replay.rerun.acting import OutsidePlayer
-from automax_ros.replay.rerun.checking import Deviation, RecordedCheck
+from automax_ros.replay.rerun.checking import RecordedCheck
 from automax_ros.replay.rerun.editing import TaskEdits
-from automax_ros.replay.rerun.outside import Outside, read_outside
+from automax_ros.replay.rerun.outside import read_outside
+from automax_ros.replay.rerun.report import RerunReport
 from automax_ros.replay.scans.state import held_in
 from automax_ros.replay.scans.stored_rack import stored_rack
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
@@ -60,109 +61,6 @@ class RerunOptions:
 
     from_ns: int = 0
     to_ns: int | None = None
-
-
-@dataclass(frozen=True)
-class RerunReport:
-    """How a rerun went; times in ns of the run.
-
-    ``at_ns`` is when the edit took its place, ``compared`` the number of messages that were as recorded before it
-    (unedited: to the end), ``deviation`` the first that was not. ``is_exact``: bit for bit, all of them.
-    """
-
-    bag: str
-    rack: str
-    edited: tuple[str, ...]
-    plants: tuple[str, ...]
-    outside: Outside
-    at_ns: int
-    to_ns: int
-    compared: int
-    deviation: Deviation | None
-    is_exact: bool
-    is_live: bool
-    scans: int
-    refused: int
-    notes: tuple[str, ...] = ()
-
-    @property
-    def is_as_recorded(self) -> bool:
-        """Whether nothing that was compared differs."""
-        return self.deviation is None
-
-    def text(self) -> str:
-        """Return the report for people."""
-        return "\n".join(self._lines()) + "\n"
-
-    def _lines(self) -> list[str]:
-        outside = self.outside
-        whole = "on the wall clock" if self.is_live else "in simulated time"
-        lines = [f"{self.bag}: rack {self.rack}, {whole}, {seconds_text(outside.ends_ns)} s"]
-        lines.append(f"from outside: {_counts_text(outside)}")
-        end, up_to = seconds_text(self.to_ns), seconds_text(self.at_ns)
-        if not self.edited:
-            lines.append(f"unedited, from the start to {end} s: {self._compared}")
-        elif self.at_ns:
-            lines.append(f"run up from the start to {up_to} s, for {self._lacks}: {self._compared}")
-        else:
-            lines.append("edited from the start on: there is nothing before it to compare")
-        if self.edited:
-            lines.append(f"edited, {seconds_text(self.at_ns)} to {end} s: {', '.join(self.edited)}")
-        lines += [f"  {note}" for note in self.notes]
-        lines.append(f"{count_of(self.scans, 'scan')} recorded")
-        return lines
-
-    @property
-    def _compared(self) -> str:
-        messages = count_of(self.compared, "message")
-        if self.deviation is not None:
-            return f"{messages} as recorded, and then not: {self.deviation.text}"
-        if not self.is_exact:
-            return f"{messages} with the recorded contents"
-        if not self.edited and self.at_ns:
-            return (
-                f"{messages} as recorded, bit for bit up to {seconds_text(self.at_ns)} s, by their contents from there"
-            )
-        return f"{messages} as recorded, bit for bit"
-
-    @property
-    def _lacks(self) -> str:
-        """Why the run does not begin at the moment of the edit."""
-        if self.plants:
-            return f"the recording does not hold the state of {', '.join(self.plants)} there"
-        return "the recording does not hold where the scheduler is there"
-
-    def as_json(self) -> dict[str, object]:
-        """Return the report for programs."""
-        deviation = self.deviation
-        return {
-            "bag": self.bag,
-            "rack": self.rack,
-            "simulated": not self.is_live,
-            "edited": list(self.edited),
-            "at_s": self.at_ns / NS_PER_S,
-            "to_s": self.to_ns / NS_PER_S,
-            "outside": dict(self.outside.counts()),
-            "compared": self.compared,
-            "exact": self.is_exact,
-            "deviation": None if deviation is None else {"at_s": deviation.time_ns / NS_PER_S, "what": deviation.what},
-            "scans": self.scans,
-            "refused": self.refused,
-            "notes": list(self.notes),
-        }
-
-
-def _counts_text(outside: Outside) -> str:
-    counts = outside.counts()
-    words = {
-        "operator": ("write of the operator", "writes of the operator"),
-        "ros": ("write from ROS", "writes from ROS"),
-        "network": ("write of a network module", "writes of a network module"),
-        "operations": ("operation", "operations"),
-        "tuned": ("tunable set", "tunables set"),
-    }
-    parts = [f"{number} {words[name][number != 1]}" for name in words if (number := counts[name])]
-    return ", ".join(parts) or "nothing"
 
 
 class Rerun:
@@ -189,7 +87,7 @@ class Rerun:
         require_tasks(bag, self.facts.table)
         self.stored.check_table(self.facts.table)
         self.stored.require_tasks(new)
-        self.outside = read_outside(self.reader, self.stored, self.facts)
+        self.outside = read_outside(self.reader, self.stored, self.facts, options.to_ns)
         self.origin = self.facts.table.stamp
         self.config: RackConfig = replace(self.stored.config, namespace=self.facts.space.strip("/"))
         self._require_start()
@@ -248,6 +146,7 @@ class Rerun:
         Raises:
             BagError: the recording cannot be read, or the new one not be written.
             RackError: an edited task does not come to the end of a scan.
+            UserError: a task has been reloaded in the recording, and what is to be tuned is not in its source any more.
         """
         edited = bool(self.new or self._tunings)
         from_ns = self.options.from_ns
@@ -262,10 +161,10 @@ class Rerun:
         check = self._check(rack, stream) if later or not edited else None
         player = OutsidePlayer(rack, self.outside.events, {} if later else self.new)
         recorder = None if later or folder is None else Recorder(rack, stream, folder, self._recorded(recording))
-        if not later:
-            self._tune(rack, player)
         at_ns = 0
         try:
+            if not later:
+                self._tune(rack, player)
             stream.begin(self.origin)
             rack.observe(player)
             rack.start(self.outside.settings, player.begin)
@@ -378,7 +277,13 @@ class Rerun:
 
     def _tune(self, rack: Rack, player: OutsidePlayer) -> None:
         for item in self._tunings:
-            rack.tune(rack.task(item.task), item.name, item.value)
+            try:
+                rack.tune(rack.task(item.task), item.name, item.value)
+            except (KeyError, ValueError) as error:
+                why = str(error) if isinstance(error, ValueError) else f"it has no tunable {item.name}"
+                when = seconds_text(rack.now_ns)
+                hint = f"the recording has reloaded {item.task} by then: begin before that with --from"
+                raise UserError(f"task {item.task} at {when} s: {why}", hint) from error
         player.watch((item.task, item.name) for item in self._tunings)
 
     def _edit(
@@ -439,6 +344,3 @@ class Rerun:
             rack.scheduler.run_until(min(rack.now_ns + SLICE_NS, end_ns))
             if on_progress is not None:
                 on_progress(rack.now_ns / max(1, self.to_ns))
-
-
-__all__ = ["RackError", "Rerun", "RerunOptions", "RerunReport"]

@@ -2,13 +2,17 @@
 
 A stimuli file writes as the operator: what ROS or another rack wrote is a ``set`` in it. Writes of one instant, and of
 one writer, are one entry; the sources of reloads are files next to it. What no verb can say stands as a comment.
+
+A recording is untrusted: none of its texts becomes more of the file than one key or one value.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 from automax_ros.core.names import element_name
 from automax_ros.core.text import printable
@@ -20,8 +24,9 @@ from automax_ros.rack.base.stop_cause import KEEP_STATE, WITHOUT_BATTERY
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER, ROS_WRITER
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.replay.rerun.events import Entry, Event, Operated, Tuned, Written
+from automax_ros.replay.rerun.events import Event, Operated, Tuned, Written
 from automax_ros.replay.rerun.outside import Outside
+from automax_ros.scenario.stimuli.rack_verbs import ALL
 from automax_ros.scenario.stimuli.reader import MOST_BYTES
 from automax_ros.scenario.stimuli.schema import MOST_ENTRIES
 
@@ -30,6 +35,22 @@ _FOR_GOOD_S = 1_000_000
 _WHOLE_RACK = ("run_all", "stop_all")
 _ON_TASK = ("run", "stop", "delete")
 _ON_TIME = ("pause", "step", "resume")
+_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]{0,39})(?:\.[0-9]{1,40})?(?:[eE][-+]?[0-9]{1,4})?")
+_PLAIN = re.compile(r"[A-Za-z_]\w*(?:\.\w+)*[%!@$]?(?:\([0-9]+\))?", re.ASCII)
+"""Names and words that stand without quotes, apart from those that YAML takes for something else."""
+_NOT_PLAIN = frozenset({"true", "false", "yes", "no", "on", "off", "null"})
+_LONGEST_KEY = 1000
+"""YAML finds the colon after a longer key only where a question mark is before it."""
+
+
+class Numeral(str):
+    """A number as it stands in a text."""
+
+    __slots__ = ()
+
+
+Given: TypeAlias = "Value | Numeral | Mapping[str, Given] | Sequence[Given]"
+"""What an entry gives to its verb."""
 
 
 @dataclass
@@ -70,7 +91,7 @@ def stimuli_text(
     made = StimuliText([f"# {printable(title)}"])
     events = [event for event in outside.events if from_ns <= event.at_ns and (to_ns is None or event.at_ns <= to_ns)]
     if outside.settings and not from_ns:
-        _add(made, 0, "set", {name: _yaml(value) for name, value in outside.settings})
+        _add(made, 0, "set", dict(outside.settings))
     if outside.begins_ns:
         when = seconds_text(outside.begins_ns)
         state = "with what had happened by then; `automax run` begins without that."
@@ -82,25 +103,20 @@ def stimuli_text(
         if isinstance(act, Written):
             _add_written(made, config, event.at_ns, act)
         elif isinstance(act, Tuned):
-            tunable = {f"{act.task}.{act.name}": _yaml(_tuned_value(act))}
-            _add(made, event.at_ns, "tune", tunable, " # by ROS")
+            _add(made, event.at_ns, "tune", {f"{act.task}.{act.name}": act.value}, " # by ROS")
         else:
             _add_operated(made, event.at_ns, act, events[number + 1 :], folder)
     if not made.entries:
         made.lines.append("# Nothing came from outside.")
-    if made.entries > MOST_ENTRIES or len(made.text) > MOST_BYTES:
-        what = f"would give {made.entries} entries, {len(made.text)} bytes; a stimuli file may have {MOST_ENTRIES}"
+    size = len(made.text.encode())
+    if made.entries > MOST_ENTRIES or size > MOST_BYTES:
+        what = f"would give {made.entries} entries, {size} bytes; a stimuli file may have {MOST_ENTRIES}"
         raise BagError("AMX6814", bag, f"{what} and {MOST_BYTES}", "write a part, with --from and --to")
     return made
 
 
-def _add(made: StimuliText, at_ns: int, verb: str, values: Mapping[str, str], remark: str = "") -> None:
-    inner = ", ".join(f"{_key(name)}: {value}" for name, value in values.items())
-    _entry(made, at_ns, verb, f"{{{inner}}}", remark)
-
-
-def _entry(made: StimuliText, at_ns: int, verb: str, value: str, remark: str = "") -> None:
-    made.lines.append(f"- {{at: {seconds_text(at_ns)}, {verb}: {value}}}{remark}")
+def _add(made: StimuliText, at_ns: int, verb: str, given: Given, remark: str = "") -> None:
+    made.lines.append(f"- {_yaml({'at': _seconds(at_ns), verb: given})}{remark}")
     made.entries += 1
 
 
@@ -116,12 +132,8 @@ def _add_written(made: StimuliText, config: RackConfig, at_ns: int, act: Written
     elif len(named) < len(act.entries):
         _remark(made, at_ns, "registers were written that have no name")
     if named:
-        _add(made, at_ns, "set", dict(_named(config, named)), remark)
-
-
-def _named(config: RackConfig, entries: Sequence[Entry]) -> Iterator[tuple[str, str]]:
-    for view, element, value in entries:
-        yield element_name(config.variables[view], element), _yaml(value)
+        values = {element_name(config.variables[view], element): value for view, element, value in named}
+        _add(made, at_ns, "set", values, remark)
 
 
 def _add_operated(made: StimuliText, at_ns: int, act: Operated, later: Sequence[Event], folder: str) -> None:
@@ -129,49 +141,46 @@ def _add_operated(made: StimuliText, at_ns: int, act: Operated, later: Sequence[
     if not act.ok:
         _remark(made, at_ns, f"{what} {name} was refused: {act.reason}")
     elif what in _WHOLE_RACK:
-        _entry(made, at_ns, what, "true")
+        _add(made, at_ns, what, True)
     elif what in _ON_TASK or (what == "clear_errors" and name):
-        _entry(made, at_ns, what, f"[{name}]")
+        _add(made, at_ns, what, [name])
     elif what == "clear_errors":
-        _entry(made, at_ns, what, "all")
+        _add(made, at_ns, what, ALL)
     elif what in ("set", "force", "tune"):
         label, _, text = detail.partition(" = ")
-        value = _yaml(act.written.entries[0][2]) if act.written is not None else _text_value(text)
-        _add(made, at_ns, what, {label: value})
+        _add(made, at_ns, what, {label: _said(text) if act.written is None else act.written.entries[0][2]})
         if what == "force":
             made.forced.add(label)
     elif what == "unforce":
         released = set(detail.split())
         every = not released or (len(released) > 1 and released == made.forced)
         made.forced -= released
-        _entry(made, at_ns, what, "all" if every else f"[{', '.join(map(_key, detail.split()))}]")
+        _add(made, at_ns, what, ALL if every else detail.split())
     elif what == "reload" and act.source is not None:
         file = _kept_source(made, name, act.source.name, act.source.text)
-        keeps = ", keep_state: true" if detail == KEEP_STATE else ""
-        _add(made, at_ns, what, {name: f"{{file: {_quoted(f'{folder}/{file}')}{keeps}}}"})
+        keeps: dict[str, Given] = {"keep_state": True} if detail == KEEP_STATE else {}
+        _add(made, at_ns, what, {name: {"file": f"{folder}/{file}", **keeps}})
     elif what in ("module", "plant", "web"):
-        _add(made, at_ns, what, dict([_work(detail, is_web=what == "web")]))
+        _add(made, at_ns, what, _work(detail, is_web=what == "web"))
     elif what == "power_off":
         _add_power(made, at_ns, later)
     elif what not in (*_ON_TIME, "power_on"):
         _remark(made, at_ns, f"{what} {name} {detail}: no verb says that")
 
 
-def _work(detail: str, *, is_web: bool) -> tuple[str, str]:
-    """Return what is operated, and what is done to it: ``7`` and ``{test_switch: A}``, ``W1`` and ``break``."""
+def _work(detail: str, *, is_web: bool) -> Given:
+    """Return what is operated, and what is done to it: ``{7: {test_switch: A}}``, ``{W1: break}``."""
     of, _, rest = detail.partition(" ")
     control, _, value = rest.partition(" ")
-    if is_web and not value:
-        return of, control
-    return of, f"{{{control}: {_quoted(value) if ' ' in value else value or '~'}}}"
+    return {of: control if is_web and not value else {control: _said(value)}}
 
 
 def _add_power(made: StimuliText, at_ns: int, later: Sequence[Event]) -> None:
     returns = ((event.at_ns, event.act) for event in later if isinstance(event.act, Operated) and event.act.ok)
     on = next(((when, act) for when, act in returns if act.what == "power_on"), None)
     off_ns = _FOR_GOOD_S * NS_PER_S if on is None else on[0] - at_ns
-    battery = ", battery: false" if on is not None and on[1].detail == WITHOUT_BATTERY else ""
-    _entry(made, at_ns, "power", f"{{off_for: {seconds_text(off_ns)}{battery}}}")
+    battery: dict[str, Given] = {"battery": False} if on is not None and on[1].detail == WITHOUT_BATTERY else {}
+    _add(made, at_ns, "power", {"off_for": _seconds(off_ns), **battery})
 
 
 def _kept_source(made: StimuliText, task: str, file: str, text: str) -> str:
@@ -184,28 +193,44 @@ def _kept_source(made: StimuliText, task: str, file: str, text: str) -> str:
     return f"{stem}_{number}.{suffix}"
 
 
-def _tuned_value(act: Tuned) -> Value:
-    return int(act.value) if act.name.endswith(("%", "!")) and not isinstance(act.value, str) else act.value
+def _seconds(time_ns: int) -> Numeral:
+    return Numeral(seconds_text(time_ns))
 
 
-def _yaml(value: Value) -> str:
-    """Return a value as a stimuli file writes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return _quoted(value) if isinstance(value, str) else value_text(value)
+def _said(text: str) -> Given:
+    """Return the value that the text of an operation says."""
+    if text in ("TRUE", "FALSE"):
+        return text == "TRUE"
+    is_string = len(text) > 1 and text[0] == text[-1] == '"'
+    return Numeral(text) if _NUMBER.fullmatch(text) else text[1:-1] if is_string else text
 
 
-def _text_value(text: str) -> str:
-    return {"TRUE": "true", "FALSE": "false"}.get(text, text)
+def _yaml(given: Given) -> str:
+    """Return data as YAML in one line."""
+    if isinstance(given, bool):
+        return "true" if given else "false"
+    if isinstance(given, Numeral):
+        return given
+    if isinstance(given, str):
+        return _word(given)
+    if isinstance(given, Mapping):
+        return f"{{{', '.join(f'{_key(key)}: {_yaml(value)}' for key, value in given.items())}}}"
+    return f"[{', '.join(map(_yaml, given))}]" if isinstance(given, Sequence) else value_text(given)
 
 
-def _key(name: str) -> str:
-    return f'"{name}"' if "," in name or ":" in name else name
+def _key(text: str) -> str:
+    if text.isdigit() and _NUMBER.fullmatch(text):
+        return text
+    return f"{'? ' if len(text) > _LONGEST_KEY else ''}{_word(text)}"
 
 
-def _quoted(text: str) -> str:
-    escaped = "".join(
-        f"\\{character}" if character in '"\\' else character if character.isprintable() else f"\\u{ord(character):04x}"
-        for character in text
-    )
-    return f'"{escaped}"'
+def _word(text: str) -> str:
+    """Return a text so that YAML reads it as this text, whatever is in it: in quotes unless it is plain."""
+    return text if _PLAIN.fullmatch(text) and text.lower() not in _NOT_PLAIN else f'"{"".join(map(_escaped, text))}"'
+
+
+def _escaped(character: str) -> str:
+    if character in '"\\':
+        return f"\\{character}"
+    code = ord(character)
+    return character if character.isprintable() else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"

@@ -43,7 +43,7 @@ def recorded_fields(bag: Path, state: TaskState) -> dict[str, tuple[Value, ...]]
         if name.endswith(_STRING):
             found: tuple[Value, ...] = tuple(islice(texts, size))
             if len(found) < size:
-                raise _wrong(bag, state, f"{name[:40]!r} lacks its text")
+                raise wrong_state(bag, state, f"{name[:40]!r} lacks its text")
         else:
             found = tuple(state.value[position : position + size])
         fields[name] = found
@@ -105,7 +105,7 @@ def _convert(bag: Path, state: TaskState, field: StateField, values: Sequence[Va
     try:
         yield from [field.typed(value) for value in values]
     except (ValueError, OverflowError) as error:
-        raise _wrong(bag, state, str(error)) from error
+        raise wrong_state(bag, state, str(error)) from error
 
 
 def state_differences(bag: Path, task: Task, state: TaskState) -> list[tuple[str, Value, Value]]:
@@ -118,7 +118,7 @@ def state_differences(bag: Path, task: Task, state: TaskState) -> list[tuple[str
     """
     own = task.snapshot()
     if len(own) != len(state.value):
-        raise _wrong(bag, state, f"{len(state.value)} values instead of {len(own)}")
+        raise wrong_state(bag, state, f"{len(state.value)} values instead of {len(own)}")
     numbers = [0.0 if isinstance(value, str) else float(value) for value in own]
     texts = [value for value in own if isinstance(value, str)]
     packing = struct.Struct(f"<{len(numbers)}d")
@@ -193,9 +193,10 @@ def current_values(program: Program | None) -> dict[str, Value]:
 
 def _check_lengths(bag: Path, state: TaskState) -> None:
     if len(state.field) != len(state.size) or sum(state.size) != len(state.value):
-        raise _wrong(bag, state, "lists of different length")
+        raise wrong_state(bag, state, "lists of different length")
 
 
-def _wrong(bag: Path, state: TaskState, reason: str) -> BagError:
+def wrong_state(bag: Path, state: TaskState, reason: str) -> BagError:
+    """Return the error for a state that no task can have."""
     when = seconds_text(max(state.stamp, 0))
     return BagError("AMX6813", bag, f"wrong state of task {state.task[:40]} at {when} s: {reason}")

@@ -131,6 +131,7 @@ def test_a_page_loads_nothing_and_escapes_texts(automax, bags):
         (["before", "after", "--shift", "x"], "not a number"),
         (["before", "after", "--shift=-9"], "no time in common"),
         (["before", "after", "--from", "2", "--to", "1"], "--to lies before --from"),
+        (["before", "after", "--align-from", "1"], "--align-from is where --align EVENT begins to look"),
         (["before", "after", "--band", "0"], "--band"),
         (["before", "after", "--tolerance=-1"], "--tolerance"),
         (["before", "after", "--plot", "x.jpeg"], "names no format of pictures"),

@@ -10,7 +10,8 @@ from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.write.recorder import Recorder
-from automax_ros.replay.rerun.rerun import Rerun, RerunOptions, RerunReport
+from automax_ros.replay.rerun.report import RerunReport
+from automax_ros.replay.rerun.rerun import Rerun, RerunOptions
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack

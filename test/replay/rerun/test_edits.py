@@ -225,6 +225,7 @@ def test_from_to_and_without_a_recording(bag, tmp_path):
     assert positions(tmp_path / "part") == positions(bag)[10:20]
     alone = Rerun(bag, {}, RerunOptions()).run(None)
     assert (alone.scans, alone.deviation) == (0, None)
+    assert ", in simulated time, 0.04 s\n" in report.text()
 
 
 def test_an_edit_that_the_recording_itself_tunes_is_told_once(tmp_path):
@@ -236,6 +237,39 @@ def test_an_edit_that_the_recording_itself_tunes_is_told_once(tmp_path):
     assert [note for note in run_again(bag, None, 0.02, "REG.GAIN=2").notes if "ends its edit" in note] == [told]
     assert told in run_again(bag, None, 0.0, "REG.GAIN=2").notes
     assert not [note for note in run_again(bag, None, 0.05, "REG.GAIN=2").notes if "ends its edit" in note]
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ((" [CURRENT=4, HIGH=100, LOW=1]", ""), "it has no tunable GAIN%"),
+        (("HIGH=100, LOW=1", "HIGH=4, LOW=3"), "GAIN% = 2 lies outside 3 to 4"),
+    ],
+)
+def test_what_a_recorded_reload_has_taken_away_cannot_be_tuned(tmp_path, change, why):
+    (tmp_path / "TELL.BAS").write_text(TELL)
+    rack = rack_from(tmp_path, YAML.format(execution="ideal"), REG=REG, PLANT=PLANT)
+    source = SourceText("REG.BLK", edited(REG, change, ("N!, E!", "N!, E!, M%"), ("110 N!", "105 M% = 4\n110 N!")))
+    bag = recorded_run(rack, tmp_path / "bag", 0.06, {0.0301: lambda: rack.operations.reload("REG", source)})
+    assert run_again(bag, tmp_path / "before", 0.03, "REG.GAIN=2").deviation is None
+    with pytest.raises(UserError) as refused:
+        run_again(bag, tmp_path / "after", 0.04, "REG.GAIN=2")
+    assert refused.value.message == f"task REG at 0.04 s: {why}"
+    assert refused.value.hint == "the recording has reloaded REG by then: begin before that with --from"
+    assert not (tmp_path / "after").exists()
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), 2.5])
+def test_a_tunable_with_a_number_that_it_cannot_have_is_refused(bag, tmp_path, number):
+    def change(message):
+        if not isinstance(message, TaskState) or message.task != "REG":
+            return message
+        place = sum(message.size[: list(message.field).index("GAIN%")])
+        return message._replace(value=[*message.value[:place], number, *message.value[place + 1 :]])
+
+    with pytest.raises(BagError, match=r"wrong state of task REG at .* s: tunable GAIN% cannot be") as refused:
+        run_again(rewritten(bag, tmp_path / "other", change), None)
+    assert refused.value.code == "AMX6813"
 
 
 def test_a_tunable_without_its_task_or_value(bag):

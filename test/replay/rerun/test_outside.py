@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from rack.helpers import rack_from
 from rack.modules.network_racks import LINE, MASTER, SLAVE, WIND, Cable, built
 from rack.test_io_interrupts import COMMON, FOLLOW
 from rack.test_io_interrupts import built as interrupting
-from scenario.stimuli.helpers import rack_in
+from scenario.stimuli.helpers import RACK, rack_in
 
 from automax_ros.messages.stream.stream import RackStream
 from automax_ros.messages.types.messages import Scan
 from automax_ros.rackfile.model.writers import OPERATOR_WRITER, ROS_WRITER
+from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.run_facts import run_facts
 from automax_ros.recordings.write.recorder import Recorder
+from automax_ros.replay.rerun import outside as module
 from automax_ros.replay.rerun.events import Operated, Tuned, Written
 from automax_ros.replay.rerun.outside import Outside, read_outside
+from automax_ros.replay.rerun.rerun import Rerun, RerunOptions
 from automax_ros.replay.scans.stored_rack import stored_rack
+from replay.replays import record
 from replay.rerun.runs import data_of, messages_of, recorded_run, run_again
+from replay.test_operated_rack import make, operate
 
 POINTS = """\
 rack: PM1
@@ -36,9 +42,9 @@ common:
 T = "10 COMMON WORD%, BIT@, SUM%\n20 CALL SCAN_LOOP(TICKS=1)\n30 SUM% = SUM% + WORD%\n40 END\n"
 
 
-def outside_of(bag: Path) -> Outside:
+def outside_of(bag: Path, to_ns: int | None = None) -> Outside:
     reader = BagReader(bag)
-    return read_outside(reader, stored_rack(reader), run_facts(reader))
+    return read_outside(reader, stored_rack(reader), run_facts(reader), to_ns)
 
 
 def assert_same_again(bag: Path, tmp_path: Path) -> Outside:
@@ -203,6 +209,58 @@ def test_a_network_module_that_is_alone_runs_by_itself(tmp_path):
     wind = built(tmp_path, SLAVE, WIND)
     outside = assert_same_again(recorded_run(wind, tmp_path / "bag", 0.1), tmp_path)
     assert (outside.played, outside.events) == (frozenset(), ())
+
+
+@pytest.mark.parametrize("execution", ["ideal", "modeled"])
+def test_with_an_end_the_rest_is_not_read(tmp_path, monkeypatch, execution):
+    """What was found is what the whole recording has up to then, and the run is the recorded one."""
+    bag = record(make(tmp_path / "rack", execution), tmp_path / "bag", operate, slices=40)
+    read = []
+    monkeypatch.setattr(module, "HOLD_NS", 0)
+    monkeypatch.setattr(module.BagReader, "messages", counting(module.BagReader.messages, read))
+    whole = outside_of(bag)
+    for to_ns in (0, 1_000_000, 300_000_000, 1_155_000_000):
+        read.clear()
+        part = outside_of(bag, to_ns)
+        assert read[-1] <= to_ns + 20_000_000 < whole.ends_ns
+        assert to_ns < part.ends_ns < to_ns + 20_000_000
+        assert part.events == tuple(event for event in whole.events if event.at_ns <= to_ns)
+        assert (part.starting, part.settings, part.forced) == (whole.starting, whole.settings, whole.forced)
+        report = Rerun(bag, {}, RerunOptions(to_ns=to_ns)).run(tmp_path / f"{to_ns}")
+        assert report.deviation is None, report.text()
+
+
+def counting(messages, read: list[int]):
+    """Note the times of the messages that are read."""
+
+    def counted(*arguments, **options):
+        for entry in messages(*arguments, **options):
+            read.append(entry.stamp)
+            yield entry
+
+    return counted
+
+
+def test_a_task_that_rested_from_the_start_is_found_out_however_early_the_end_is(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "HOLD_NS", 0)
+    rack = rack_in(tmp_path, RACK.replace("rack: PM1", "rack: PM1\nauto_run: true"))
+    rack.operations.starting = frozenset({"SPEED"})
+    bag = recorded_run(rack, tmp_path / "bag", 0.02)
+    assert outside_of(bag, 1_000_000).starting == outside_of(bag).starting == {"SPEED"}
+    assert Rerun(bag, {}, RerunOptions(to_ns=1_000_000)).run(None).deviation is None
+
+
+def test_more_from_outside_than_is_kept_is_refused_unless_the_end_is_earlier(tmp_path, monkeypatch):
+    """An event counts, and each value that it wrote."""
+    rack = rack_in(tmp_path)
+    acts = {0.001 * number: lambda number=number: rack.write("REF%", number) for number in range(1, 6)}
+    bag = recorded_run(rack, tmp_path / "bag", 0.01, acts)
+    monkeypatch.setattr(module, "HOLD_NS", 0)
+    monkeypatch.setattr(module, "MOST_EVENTS", 9)
+    with pytest.raises(BagError, match="has more than 9 events from outside") as refused:
+        outside_of(bag)
+    assert (refused.value.code, refused.value.hint) == ("AMX6814", "end more than 1 s before that, with --to")
+    assert len(outside_of(bag, 3_900_000).events) == 3
 
 
 def test_many_writes_in_one_call_are_one_event(tmp_path):
