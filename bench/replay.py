@@ -104,15 +104,28 @@ def print_replay(what: str, bag: Path, rate: float, new: Mapping[str, SourceText
     for (form, _), report, best in zip(FORMS, reports, times, strict=True):
         result = "identical" if report.identical else f"{sum(task.different for task in report.tasks)} scans differ"
         print(
-            f"{what:42}{form:23}{report.scans / best:10,.0f} of {rate:.0f} scans per second: "
+            f"{what:43} {form:23}{report.scans / best:10,.0f} of {rate:.0f} scans per second: "
             f"{SECONDS / best:7.1f} x real time, wanted {WANTED}; {times[0] / best:5.1f} x the first form; {result}"
         )
 
 
+EDITS: dict[str, list[tuple[str, str]]] = {
+    "one gain edited": [("CURRENT=26.7", "CURRENT=30.0")],
+    "its filter edited": [("WLG=60.0", "WLG=20.0")],
+    "more locals": [("CURRENT=26.7", "CURRENT=30.0"), ("LOCAL TACH_DELAY%", "LOCAL MORE%, TACH_DELAY%")],
+    "a common more": [("COMMON TACH0%", "COMMON TACH1%, TACH0%"), ("LAG(INPUT=TACH0%", "LAG(INPUT=TACH1%")],
+}
+"""Edits of the first regulator; the last one is only for one of five."""
+
+
 def print_both(what: str, bag: Path, rate: float, name: str, text: str) -> None:
-    edited = text.replace("CURRENT=26.7", "CURRENT=30.0")
     print_replay(what, bag, rate, {})
-    print_replay(f"{what}, one gain edited", bag, rate, {name: SourceText(f"{name}.BLK", edited)})
+    for edit, changes in EDITS.items():
+        edited = text
+        for old, new in changes:
+            edited = edited.replace(old, new)
+        if edited != text:
+            print_replay(f"{what}, {edit}", bag, rate, {name: SourceText(f"{name}.BLK", edited)})
 
 
 def print_side_by_side(bag: Path, form: str, options: ReplayOptions) -> None:

@@ -6,7 +6,7 @@ model for faster forms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -37,11 +37,14 @@ class Executed:
 class ColumnForm(Protocol):
     """Executes scans of one task; the state is changed in place, to that after the scans done."""
 
-    def columns(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> Executed:
+    def columns(
+        self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries, *, latches_own: bool = False
+    ) -> Executed:
         """Execute ``count`` scans.
 
         ``latched`` are the values of each of ``CompiledTask.latched``, ``read`` those that BASIC statements read, in
-        order.
+        order. ``latches_own``: each scan latches of the outputs what the one before has left, the first one what is
+        in ``latched``.
         """
         ...
 
@@ -59,23 +62,28 @@ class PythonColumns:
         places = {name: place for place, name in enumerate(compiled.latched)}
         self._outputs = [places[name] for name in compiled.written]
 
-    def columns(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> Executed:
+    def columns(
+        self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries, *, latches_own: bool = False
+    ) -> Executed:
         """Execute scans; see ``ColumnForm``."""
         before = [value[:] if isinstance(value, list) else value for value in state]
-        io = self._execute(state, latched, count, read)
+        io = self._execute(state, latched, count, read, latches_own)
         if io.done < count:
             # The scan that could not be executed has changed the state: execute the scans before it again.
             state[:] = before
-            io = self._execute(state, latched, io.done, read)
-        return self._build_executed(io, latched)
+            io = self._execute(state, latched, io.done, read, latches_own)
+        return self._build_executed(io, latched, latches_own)
 
-    def _execute(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> _ColumnIo:
+    def _execute(
+        self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries, latches_own: bool
+    ) -> _ColumnIo:
         columns = [
             (column[:count] != 0 if flag else column[:count]).tolist()
             for column, flag in zip(latched, self._flags, strict=True)
         ]
         rows: list[Latched] = list(zip(*columns, strict=True)) if columns else [()] * count
-        io = _ColumnIo(rows, read, self._types, self._backplane)
+        own = {self._views[place]: place for place in self._outputs} if latches_own else {}
+        io = _ColumnIo(rows, read, self._types, self._backplane, own)
         scans = self._compiled.scans(state, io)
         try:
             for _ in range(count):
@@ -92,14 +100,20 @@ class PythonColumns:
         io.end()
         return io
 
-    def _build_executed(self, io: _ColumnIo, latched: Sequence[Ints]) -> Executed:
+    def _build_executed(self, io: _ColumnIo, latched: Sequence[Ints], latches_own: bool) -> Executed:
         done = io.done
         position = {self._views[place]: number for number, place in enumerate(self._outputs)}
         outputs = [latched[place][:done].copy() for place in self._outputs]
-        for scan, changes in io.commits:
+        ends = [done] * len(outputs)
+        for scan, changes in reversed(io.commits):
             for view, value in changes:
                 if scan < done:
-                    outputs[position[view]][scan] = value
+                    number = position[view]
+                    outputs[number][scan : ends[number] if latches_own else scan + 1] = value
+                    ends[number] = scan
+        for output, end in zip(outputs, ends, strict=True):
+            if latches_own:
+                output[:end] = output[:1]
         errors = np.array([row for row in io.errors if row[0] < done], np.int64).reshape(-1, 3)
         return Executed(done, outputs, errors, io.written(done))
 
@@ -109,10 +123,21 @@ class _Elsewhere(Exception):
 
 
 class _ColumnIo:
-    """The inputs and outputs of the scans, of which ``done`` are complete."""
+    """The inputs and outputs of the scans, of which ``done`` are complete.
 
-    def __init__(self, rows: list[Latched], read: Entries, types: Sequence[DataType], backplane: Backplane) -> None:
+    ``own`` are the places, by view, of what is latched as the scan before has left it.
+    """
+
+    def __init__(
+        self,
+        rows: list[Latched],
+        read: Entries,
+        types: Sequence[DataType],
+        backplane: Backplane,
+        own: Mapping[int, int],
+    ) -> None:
         self._rows = iter(rows)
+        self._own, self._left = own, dict[int, Value]()
         self._types, self._backplane = types, backplane
         self._read, self._place, self._end = read, 0, 0
         self._places = list(zip(read.views.tolist(), read.elements.tolist(), strict=True))
@@ -157,7 +182,15 @@ class _ColumnIo:
 
     def latch(self) -> Latched:
         """Return the latched values of the scan."""
-        return next(self._rows)
+        row = next(self._rows)
+        if not self._own:
+            return row
+        if not self._left:
+            self._left = {place: row[place] for place in self._own.values()}
+        values = list(row)
+        for place, value in self._left.items():
+            values[place] = value
+        return tuple(values)
 
     def forces(self) -> tuple[bool, ...]:
         """Leave the scan to scan-by-scan replay: nothing is forced here."""
@@ -166,6 +199,8 @@ class _ColumnIo:
     def commit(self, changes: list[tuple[int, Value]]) -> None:
         """Record the changes by blocks."""
         self.commits.append((self._scan, changes))
+        if self._own:
+            self._left.update((self._own[view], value) for view, value in changes)
 
     def read_now(self, view: int, element: int = 0) -> Value:
         """Return the value that the recorded scan read at this place."""

@@ -83,10 +83,12 @@ class NativeColumns:
     def __init__(self, task: NativeTask) -> None:
         self._task = task
 
-    def columns(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> Executed:
+    def columns(
+        self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries, *, latches_own: bool = False
+    ) -> Executed:
         """Execute scans; see ``ColumnForm``."""
         actual = BesideLatch(read.offsets, read.views, read.elements, read.values)
-        executed = self._task.columns(state, latched, count, actual)
+        executed = self._task.columns(state, latched, count, actual, latches_own=latches_own)
         done, written = executed.done, executed.written
         within = written.scans < done
         counts = np.bincount(written.scans[within], minlength=done)

@@ -125,7 +125,7 @@ SCANS = TakenKind(
     "errors",
     "task",
 )
-WRITES = TakenKind(NAMES[CommonWrite], ("sequence", "kind", "run_id"), ("values",))
+WRITES = TakenKind(NAMES[CommonWrite], ("sequence", "kind", "run_id", "writer"), ("values",))
 
 
 @lru_cache(maxsize=2)

@@ -61,12 +61,14 @@ FORCING = (int(WriteKind.FORCE), int(WriteKind.RELEASE))
 class WriteColumns:
     """Writes in the order of the file; ``places`` are those of their messages in the block.
 
-    ``good`` are those that may be applied together; the others must be applied one by one, since they are malformed or
-    of another run, do not fit the variables of the rack, contain strings or do not follow the previous write.
+    ``writers`` are the numbers of their writers. ``good`` are those that may be applied together; the others must be
+    applied one by one, since they are malformed or of another run, do not fit the variables of the rack, contain
+    strings or do not follow the previous write.
     """
 
     places: Ints
     sequences: Ints
+    writers: Ints
     entries: Entries
     good: NDArray[np.bool_]
 
@@ -78,7 +80,8 @@ class WriteColumns:
     def part(self, begin: int, end: int) -> WriteColumns:
         """Return the writes from ``begin`` to before ``end``."""
         entries = self.entries.part(begin, end)
-        return WriteColumns(self.places[begin:end], self.sequences[begin:end], entries, self.good[begin:end])
+        places, sequences, writers = (item[begin:end] for item in (self.places, self.sequences, self.writers))
+        return WriteColumns(places, sequences, writers, entries, self.good[begin:end])
 
     def runs(self) -> Iterator[WriteColumns]:
         """Yield the writes in stretches that are all good or all not good."""
@@ -126,7 +129,7 @@ def write_columns(
     """Return the writes, and the places of those by which a force begins or ends."""
     taken = library.taken(WRITES, block.data, block.starts[places], block.lengths[places], rules)
     entries = library.picked(taken, np.arange(len(places)))[0]
-    sequences, kinds, runs = taken.numbers.values()
+    sequences, kinds, runs, writers = taken.numbers.values()
     for row in taken.malformed.tolist():
         write = _decode(block, int(places[row]))
         if write is None:
@@ -136,7 +139,7 @@ def write_columns(
     own = runs.view(np.uint64) == np.uint64(run_id & ((1 << 64) - 1))
     good = own & (sequences >= 0) & (sequences < LIMIT) & ~(taken.odd | taken.with_texts | forcing)
     good[1:] &= np.diff(sequences) == 1
-    return WriteColumns(places, sequences, entries, good), places[forcing]
+    return WriteColumns(places, sequences, writers, entries, good), places[forcing]
 
 
 def _decode(block: MessageBlock, place: int) -> Any:

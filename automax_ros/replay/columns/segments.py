@@ -6,8 +6,10 @@ from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
+from automax_ros.core.kinds import WriterKind
 from automax_ros.recordings.read.blocks import MessageBlock
 from automax_ros.recordings.read.reader import BagMessage
+from automax_ros.replay.columns.apart import ApartStretches
 from automax_ros.replay.columns.entries import ValueRules
 from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.library import ColumnLibrary
@@ -49,6 +51,11 @@ class BlockReplay:
         self._stretches = {
             name: TaskStretches(task, commons, self._rules, forms, library) for name, task in tasks.items()
         }
+        numbers = {writer.name: writer.id for writer in commons.facts.table.writers if writer.kind == WriterKind.TASK}
+        self._apart = {
+            name: ApartStretches(task, self._stretches[name], commons, library, numbers.get(name, -1))
+            for name, task in tasks.items()
+        }
         self._library = library
         self.types = (SCAN, WRITE, *sorted({*types} - {SCAN, WRITE}))
         """The types of messages to read, in the order in which a block numbers them."""
@@ -72,23 +79,53 @@ class BlockReplay:
         if end - begin < FEWEST_MESSAGES:
             return self._one_by_one(part, range(begin, end))
         left = part.strays_between(begin, end)
-        for name in self._tasks:
+        apart: dict[int, str] = {}
+        until = dict.fromkeys(self._tasks, begin)
+        for name, task in self._tasks.items():
             scans = part.scans_between(name, begin, end)
-            if scans is not None:
-                left += scans.places[self._replay_columns(name, scans) :].tolist()
+            if scans is None:
+                continue
+            rest = scans.places[self._replay_columns(name, scans) :].tolist()
+            if task.edited:
+                apart.update(dict.fromkeys(rest, name))
+                until[name] = self._replay_apart(part, name, begin, end) if rest[0] == scans.places[0] else begin
+            left += rest
         position = begin
         for place in sorted(left):
+            name = apart.get(place, "")
+            if name and place < until[name]:
+                continue
             if not self._writes(part, position, place) or not self._take(part.block.message(place)):
                 return False
             position = place + 1
+            if name:
+                until[name] = self._replay_apart(part, name, position, end)
         return self._writes(part, position, end)
 
     def _replay_columns(self, name: str, scans: ScanColumns) -> int:
         """Replay scans of a task by columns up to the first odd one, and never the last; return how many."""
+        alike, counted = self._alike(scans)
+        return self._stretches[name].take(scans.part(0, alike), counted=counted)
+
+    def _replay_apart(self, part: _BlockPart, name: str, begin: int, end: int) -> int:
+        """Replay by columns what an edited task does from ``begin`` on; return the place of the next scan to replay.
+
+        Common memory is that of ``begin``.
+        """
+        apart = self._apart[name]
+        scans = part.scans_between(name, begin, end) if apart.is_due else None
+        if scans is None:
+            return begin
+        alike, counted = self._alike(scans)
+        taken = apart.take(scans.part(0, alike), part.writes.between(begin, end), counted=counted)
+        return int(scans.places[taken])
+
+    def _alike(self, scans: ScanColumns) -> tuple[int, bool]:
+        """Return how many scans, without the last one, are all counted or all not counted, and none odd; and which."""
         counted = scans.stamps >= self._begin
         alike = (counted == counted[0]) & ~scans.odd
         alike[-1] = False
-        return self._stretches[name].take(scans.part(0, int(np.argmin(alike))), counted=bool(counted[0]))
+        return int(np.argmin(alike)), bool(counted[0])
 
     def _writes(self, part: _BlockPart, begin: int, end: int) -> bool:
         """Apply the writes between two places."""
@@ -96,16 +133,17 @@ class BlockReplay:
 
     def _write_run(self, part: _BlockPart, run: WriteColumns) -> bool:
         """Apply writes that are all good or all not good."""
-        if len(run.places) >= FEWEST_WRITES and run.good[0] and not self._looks_at_writes(part):
+        if len(run.places) >= FEWEST_WRITES and run.good[0] and not self._looks_at_writes(part, run):
             entries = run.entries
             if self._commons.take_many(run.sequences, entries.views, entries.elements, entries.values):
                 return True
         return self._one_by_one(part, run.places.tolist())
 
-    def _looks_at_writes(self, part: _BlockPart) -> bool:
+    def _looks_at_writes(self, part: _BlockPart, run: WriteColumns) -> bool:
         """Return whether a task needs each write: those of others matter, or scans follow their writes in the log."""
         return any(
-            task.memory.is_apart or (task.edited and part.is_modeled(task.name)) for task in self._tasks.values()
+            (task.memory.is_apart and self._apart[name].concern(run)) or (task.edited and part.is_modeled(name))
+            for name, task in self._tasks.items()
         )
 
     def _one_by_one(self, part: _BlockPart, places: Collection[int]) -> bool:

@@ -47,18 +47,37 @@ FEWEST_SCANS = 16
 
 
 @dataclass(frozen=True)
-class _Form:
+class TaskForm:
     """The form in which the present task is executed."""
 
     task: Task
     columns: ColumnForm
     latched: LatchedColumns
+    views: Ints
+    """The latched views."""
     written: Ints
     """The views of the outputs."""
     places: Ints
     """The places of the outputs among the latched views."""
     flags: tuple[bool, ...]
     """Which of the latched views are BOOLEANs."""
+
+    def execute(self, latched: Ints, scans: ScanColumns, *, latches_own: bool = False) -> Executed:
+        """Execute scans, with a row of values for each latched view; see ``ColumnForm``."""
+        return self.columns.columns(self.task.state, list(latched), len(scans), scans.read, latches_own=latches_own)
+
+    def skipped(self, scans: ScanColumns, executed: Executed, latched: Ints, *, counted: bool) -> Skipped:
+        """Return what scan-by-scan replay needs of the executed scans; ``latched`` is the last one's latch."""
+        last = executed.done - 1
+        return Skipped(
+            count=executed.done,
+            scan=int(scans.scans[last]),
+            stamp=int(scans.stamps[last]),
+            duration_ns=int(scans.durations[last]),
+            latched=[value != 0 if flag else value for value, flag in zip(latched.tolist(), self.flags, strict=True)],
+            errors=[(int(scans.scans[row]), line, code) for row, line, code in executed.errors.tolist()],
+            counted=counted,
+        )
 
 
 class TaskStretches:
@@ -77,58 +96,48 @@ class TaskStretches:
     ) -> None:
         self._replay, self._commons, self._rules = replay, commons, rules
         self._forms, self._library = forms, library
-        self._form: _Form | None = None
+        self._form: TaskForm | None = None
 
     def take(self, scans: ScanColumns, *, counted: bool) -> int:
         """Execute scans and compare them; return how many, from the first on, did not differ."""
         replay = self._replay
         if len(scans) < FEWEST_SCANS or not replay.is_uniform:
             return 0
-        form = self._present_form()
+        form = self.present_form()
         scans = scans.part(0, self._uniform(scans, form))
         if len(scans) < FEWEST_SCANS:
             return 0
         latched = form.latched.columns(scans.latched, [int(value) for value in replay.memory.latched_last])
         state = form.task.state
         before = [value[:] if isinstance(value, list) else value for value in state]
-        executed = form.columns.columns(state, list(latched), len(scans), scans.read)
+        executed = form.execute(latched, scans)
         same = self._count_equal(scans, executed, latched, form)
         if same < executed.done:
             state[:] = before
-            executed = form.columns.columns(state, list(latched), same, scans.read.part(0, same))
+            executed = form.execute(latched, scans.part(0, same))
         if same:
-            last = latched[:, same - 1].tolist()
-            replay.skip(
-                Skipped(
-                    count=same,
-                    scan=int(scans.scans[same - 1]),
-                    stamp=int(scans.stamps[same - 1]),
-                    duration_ns=int(scans.durations[same - 1]),
-                    latched=[value != 0 if flag else value for value, flag in zip(last, form.flags, strict=True)],
-                    errors=[(int(scans.scans[row]), line, code) for row, line, code in executed.errors.tolist()],
-                    counted=counted,
-                )
-            )
+            replay.skip(form.skipped(scans, executed, latched[:, same - 1], counted=counted))
         return same
 
-    def _present_form(self) -> _Form:
+    def present_form(self) -> TaskForm:
         """Return the form of the present task, which may have been reloaded."""
         task = self._replay.task
         if self._form is None or self._form.task.compiled is not task.compiled or self._form.task is not task:
             compiled = task.compiled
             views = [task.memory.view(name) for name in compiled.latched]
             places = {name: place for place, name in enumerate(compiled.latched)}
-            self._form = _Form(
+            self._form = TaskForm(
                 task,
                 self._forms.form(compiled, views),
                 LatchedColumns(views, self._rules.count, self._library),
+                np.array(views, np.int64),
                 np.array([task.memory.view(name) for name in compiled.written], np.int64),
                 np.array([places[name] for name in compiled.written], np.int64),
                 tuple(type_of_name(name) is DataType.BOOLEAN for name in compiled.latched),
             )
         return self._form
 
-    def _uniform(self, scans: ScanColumns, form: _Form) -> int:
+    def _uniform(self, scans: ScanColumns, form: TaskForm) -> int:
         """Return how many scans can be executed by columns: they are consecutive, and nothing is forced."""
         replay = self._replay
         if not self._commons.unforced_since(int(scans.stamps.min())):
@@ -140,7 +149,7 @@ class TaskStretches:
         count = len(scans) if following.all() else int(np.argmin(following))
         return min(count, form.latched.whole(scans))
 
-    def _count_equal(self, scans: ScanColumns, executed: Executed, latched: Ints, form: _Form) -> int:
+    def _count_equal(self, scans: ScanColumns, executed: Executed, latched: Ints, form: TaskForm) -> int:
         """Return how many scans have the recorded results."""
         done = executed.done
         if not done:
@@ -151,11 +160,11 @@ class TaskStretches:
                 scans.committed, executed.outputs, list(latched[form.places, :done]), form.written
             ),
             first_other(scans.written, executed.written),
-            self._same_errors(scans, executed),
+            self.same_errors(scans, executed),
         )
 
-    def _same_errors(self, scans: ScanColumns, executed: Executed) -> int:
-        """Return how many scans logged the same errors; in an edited task lines do not count."""
+    def same_errors(self, scans: ScanColumns, executed: Executed) -> int:
+        """Return how many of the executed scans logged the same errors; in an edited task lines do not count."""
         rows, lines, codes = np.ascontiguousarray(executed.errors.T)
         offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(rows, minlength=len(scans)))))
         recorded, own = scans.errors, Entries(offsets, lines, codes, np.zeros(len(codes)))

@@ -6,8 +6,11 @@ counted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
@@ -20,6 +23,8 @@ from automax_ros.replay.scans.report import (
     ScanPoint,
     Settled,
 )
+
+Ints = NDArray[np.int64]
 
 BAND_COUNTS = 2
 """A difference of whole numbers counts as settled within this many counts (decision) ..."""
@@ -56,6 +61,15 @@ class Seen(NamedTuple):
     read: tuple[NamedValue, ...] = ()
 
 
+class Stretch(NamedTuple):
+    """One whole number, or BOOLEAN, after each of some scans; ``counts`` is as in ``Found``."""
+
+    recorded: Ints
+    replayed: Ints
+    counts: NDArray[np.bool_]
+    boolean: bool
+
+
 class _Run:
     """The latest stretch of scans in which a difference has stayed in its band; ``floor`` is the band's least width."""
 
@@ -66,24 +80,28 @@ class _Run:
         self._scans = self._same = 1
         self._zero_scan, self._zero_time_s, self._zeros = scan, time_s, 0
 
-    def add(self, scan: int, time_s: float, difference: float) -> None:
-        """Add a scan; outside of the band, and after a stretch of equality, a new stretch begins."""
-        if difference:
-            was_equal, self._zeros = self._zeros >= SETTLED_SCANS, 0
-        else:
+    def add(self, scans: Sequence[int], times_s: Sequence[float], differences: Sequence[float]) -> None:
+        """Add scans; outside of the band, and after a stretch of equality, a new stretch begins."""
+        low, high, latest, same = self._low, self._high, self._latest, self._same
+        count, zeros, floor = self._scans, self._zeros, self._floor
+        for scan, time_s, difference in zip(scans, times_s, differences, strict=True):
             was_equal = False
-            if not self._zeros:
-                self._zero_scan, self._zero_time_s = scan, time_s
-            self._zeros += 1
-        low, high = min(self._low, difference), max(self._high, difference)
-        if was_equal or high - low > max(self._floor, BAND_SHARE * max(abs(low), abs(high))):
-            self._scan, self._time_s, self._scans = scan, time_s, 1
-            self._low = self._high = self._begin = difference
-        else:
-            self._low, self._high = low, high
-            self._scans += 1
-        self._same = self._same + 1 if difference == self._latest else 1
-        self._latest = difference
+            if difference:
+                was_equal, zeros = zeros >= SETTLED_SCANS, 0
+            else:
+                if not zeros:
+                    self._zero_scan, self._zero_time_s = scan, time_s
+                zeros += 1
+            count += 1
+            if was_equal or not low <= difference <= high:
+                low, high = min(low, difference), max(high, difference)
+                if was_equal or high - low > max(floor, BAND_SHARE * max(abs(low), abs(high))):
+                    self._scan, self._time_s, count = scan, time_s, 1
+                    low = high = self._begin = difference
+            same = same + 1 if difference == latest else 1
+            latest = difference
+        self._low, self._high, self._latest, self._same = low, high, latest, same
+        self._scans, self._zeros = count, zeros
 
     def settled(self) -> Settled | None:
         """Return the stretch, None if it is too short or still drifts."""
@@ -118,10 +136,24 @@ class _Count:
             self._greatest = Greatest(scan, time_s, difference)
         self._goes_on(scan, time_s, difference, BAND_COUNTS if isinstance(difference, int) else 0)
 
-    def agrees(self, scan: int, time_s: float) -> None:
-        """Count a scan after which the item does not differ."""
+    def agrees(self, scans: Sequence[int], times_s: Sequence[float]) -> None:
+        """Count scans after which the item does not differ."""
         if self._run is not None:
-            self._run.add(scan, time_s, 0)
+            self._run.add(scans, times_s, (0,) * len(scans))
+
+    def stretch(self, stretch: Stretch, scans: Sequence[int], times_s: Sequence[float]) -> None:
+        """Count scans one after another, of which some may not differ, as ``differs`` and ``agrees`` do."""
+        self._scans += int(np.count_nonzero(stretch.counts))
+        differences = stretch.replayed - stretch.recorded
+        if stretch.boolean:
+            differences = np.abs(differences)
+        else:
+            place = int(np.argmax(np.abs(differences)))
+            greatest = int(differences[place])
+            if self._greatest is None or abs(greatest) > abs(self._greatest.difference):
+                self._greatest = Greatest(scans[place], times_s[place], greatest)
+        assert self._run is not None
+        self._run.add(scans, times_s, differences.tolist())
 
     def result(self) -> Difference:
         """Return the difference that was counted."""
@@ -143,7 +175,7 @@ class _Count:
         if self._run is None:
             self._run = _Run(scan, time_s, difference, floor)
         else:
-            self._run.add(scan, time_s, difference)
+            self._run.add((scan,), (time_s,), (difference,))
 
 
 class DifferenceCounts:
@@ -188,11 +220,32 @@ class DifferenceCounts:
                 now.add(key)
         for key, tally in tallies.items():
             if key not in now:
-                tally.agrees(scan, time_s)
+                tally.agrees((scan,), (time_s,))
         differs = any(item.counts for item in found)
         if differs and self._first is None:
             self._first = (task, scan, time_s, seen())
         return differs
+
+    def has(self, task: str, key: Hashable) -> bool:
+        """Return whether a variable of a task has differed before, counted in full or not."""
+        known = DifferenceKind.VARIABLE, key
+        return known in self._by_task.get(task, {}) or (task, *known) in self._beyond
+
+    def stretches(self, task: str, found: Mapping[Hashable, Stretch], scans: Ints, stamps: Ints) -> int:
+        """Count scans of variables by their keys, of which each that differs has differed before.
+
+        Nothing else of the task differs in these scans. Returns how many of them differ.
+        """
+        numbers, times_s = scans.tolist(), ((stamps - self.origin) / NS_PER_S).tolist()
+        for (kind, key), tally in self._by_task.get(task, {}).items():
+            if kind is DifferenceKind.VARIABLE and key in found:
+                tally.stretch(found[key], numbers, times_s)
+            else:
+                tally.agrees(numbers, times_s)
+        differs = np.zeros(len(scans), bool)
+        for stretch in found.values():
+            differs |= stretch.counts
+        return int(np.count_nonzero(differs))
 
     def states(
         self,

@@ -6,7 +6,7 @@ In the log a scan precedes its writes, so common memory as rebuilt so far is the
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 from automax_ros.compile.base.scan_io import MUST_WAIT
 from automax_ros.core.kinds import WriteKind
@@ -187,6 +187,16 @@ class ReplayMemory:
     def is_uniform(self) -> bool:
         """Whether the inputs of a scan are exactly the values that the recorded one latched and read."""
         return not (self._unrecorded or self.apart or self._before or self._forced)
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether the inputs of a scan are those of the recorded one, and what the task itself has left."""
+        return not (self._before or self._forced)
+
+    @property
+    def unrecorded(self) -> Collection[int]:
+        """The places of the latched views whose values the recorded scans did not latch."""
+        return self._unrecorded
 
     @property
     def latched_last(self) -> Sequence[Value]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
 
 from automax_ros.core.kinds import WriteKind
@@ -11,9 +11,10 @@ from automax_ros.core.ticks import seconds_text
 from automax_ros.messages.types.messages import CommonWrite, Operation, Scan, TaskState
 from automax_ros.rack.tasks.installation import task_class
 from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.common_log import Key
 from automax_ros.replay.scans.carried_state import PartStart, Skipped
 from automax_ros.replay.scans.commons import RecordedCommons, UnknownValue
-from automax_ros.replay.scans.compare import DifferenceCounts, Found
+from automax_ros.replay.scans.compare import DifferenceCounts, Found, Ints, Stretch
 from automax_ros.replay.scans.comparison import ScanComparison
 from automax_ros.replay.scans.inputs import ReplayMemory
 from automax_ros.replay.scans.report import DifferenceKind
@@ -210,10 +211,36 @@ class TaskReplay:
     @property
     def is_uniform(self) -> bool:
         """Whether its next scans depend only on their latched and read values, and nothing has differed so far."""
+        return self._follows and self.memory.is_uniform and self._tallies.is_clean(self.name)
+
+    @property
+    def goes_alone(self) -> bool:
+        """Whether the next scans of an edited source depend only on recorded inputs and on what it has left itself."""
+        return self.edited and self._follows and self.memory.is_alone
+
+    @property
+    def _follows(self) -> bool:
         program = self._task.compiled.program
         scans_here = not (program.is_basic or program.cml is not None or self._task.forces or self.stopped)
-        follows = self._synchronous and self._starts_at is None and self.beginning.is_settled
-        return scans_here and follows and self.memory.is_uniform and self._tallies.is_clean(self.name)
+        return scans_here and self._synchronous and self._starts_at is None and self.beginning.is_settled
+
+    @property
+    def tolerance(self) -> float:
+        """Numbers that differ by at most this count as equal."""
+        return self._tolerance
+
+    @property
+    def has_compared(self) -> bool:
+        """Whether a scan was compared before."""
+        return self._compared > 0
+
+    def has_differed(self, key: Key) -> bool:
+        """Return whether a common of this task has differed before."""
+        return self._tallies.has(self.name, key)
+
+    def count_apart(self, found: Mapping[Hashable, Stretch], scans: Ints, stamps: Ints) -> None:
+        """Count the differences of skipped scans (``DifferenceCounts.stretches``)."""
+        self._different += self._tallies.stretches(self.name, found, scans, stamps)
 
     def skip(self, skipped: Skipped) -> None:
         """Account for scans that were executed by columns, from the task's state on, without a difference."""

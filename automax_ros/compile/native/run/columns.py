@@ -107,7 +107,13 @@ class Columns:
         self._kinds, self._written = tuple(latched_kinds), tuple(written)
 
     def execute(
-        self, state: StateValues, latched: Sequence[Column], count: int, actual: BesideLatch | None
+        self,
+        state: StateValues,
+        latched: Sequence[Column],
+        count: int,
+        actual: BesideLatch | None,
+        *,
+        latches_own: bool = False,
     ) -> ExecutedScans:
         """Execute ``count`` scans on these columns; the state is changed in place (see ``ExecutedScans``).
 
@@ -119,20 +125,23 @@ class Columns:
         try:
             before = self._slots.taken(state)
         except Misfit:
-            return self._run(np.empty(0, np.int64), columns, 0, None).executed()
+            return self._run(np.empty(0, np.int64), columns, 0, None, latches_own).executed()
         slots = before.copy()
-        run = self._run(slots, columns, count, actual)
+        run = self._run(slots, columns, count, actual, latches_own)
         if run.done < count:
             # The state is now between two scans: the complete scans are executed again, from the state before.
             slots = before.copy()
-            run = self._run(slots, columns, run.done, actual)
+            run = self._run(slots, columns, run.done, actual, latches_own)
         self._slots.put(slots, before, state)
         return run.executed()
 
-    def _run(self, slots: Slots, columns: Sequence[Column], count: int, actual: BesideLatch | None) -> _Run:
+    def _run(
+        self, slots: Slots, columns: Sequence[Column], count: int, actual: BesideLatch | None, latches_own: bool
+    ) -> _Run:
         room = _ROOM * count + 64
         while True:
-            run = _Run(columns, [self._kinds[place] for place in self._written], count, actual, room)
+            latched, outputs = self._tables(columns, count, latches_own)
+            run = _Run(latched, outputs, count, actual, room)
             if not count:
                 return run
             kept = slots.copy()
@@ -141,6 +150,18 @@ class Columns:
                 return run
             slots[:] = kept
             room *= 8
+
+    def _tables(self, columns: Sequence[Column], count: int, latches_own: bool) -> tuple[list[Column], list[Column]]:
+        """Return the columns to latch from and those for the outputs."""
+        if not latches_own or not count:
+            kinds = [self._kinds[place] for place in self._written]
+            return [*columns], [_as_column(np.empty(count, np.int64), kind) for kind in kinds]
+        latched = [*columns]
+        # One array for both: what scan k leaves in place k + 1 of it is what scan k + 1 latches.
+        shared = [columns[place][:1].repeat(count + 1) for place in self._written]
+        for place, column in zip(self._written, shared, strict=True):
+            latched[place] = column
+        return latched, [column[1:] for column in shared]
 
     def _check(self, latched: Sequence[Column], count: int) -> list[Column]:
         if len(latched) != len(self._kinds):
@@ -172,10 +193,15 @@ class _Run:
     """One call: its arguments, which must live as long as it, and its results."""
 
     def __init__(
-        self, columns: Sequence[Column], kinds: Sequence[int], count: int, actual: BesideLatch | None, room: int
+        self,
+        columns: Sequence[Column],
+        outputs: Sequence[Column],
+        count: int,
+        actual: BesideLatch | None,
+        room: int,
     ) -> None:
         self._kept: list[Column] = [*columns]
-        self._outputs: list[Column] = [_as_column(np.empty(count, np.int64), kind) for kind in kinds]
+        self._outputs = outputs
         self._errors = [np.empty(room, np.int64) for _ in range(3)]
         self._places = [np.empty(room, np.int64) for _ in range(3)]
         self._values = np.empty(room, np.float64)

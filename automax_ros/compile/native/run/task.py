@@ -109,14 +109,22 @@ class NativeTask:
         self._columns = Columns(path, slots, kinds, places)
 
     def columns(
-        self, state: StateValues, latched: Sequence[Column], count: int, actual: BesideLatch | None = None
+        self,
+        state: StateValues,
+        latched: Sequence[Column],
+        count: int,
+        actual: BesideLatch | None = None,
+        *,
+        latches_own: bool = False,
     ) -> ExecutedScans:
         """Execute ``count`` scans on columns of latched values: int64, float64 for REALs; the state changes in place.
+
+        ``latches_own``: of the outputs each scan latches what the one before has left, only the first one its column.
 
         Raises:
             ValueError: the columns or the rows of ``actual`` do not fit the task or the count.
         """
-        return self._columns.execute(state, latched, count, actual)
+        return self._columns.execute(state, latched, count, actual, latches_own=latches_own)
 
 
 def native_form(
