@@ -11,6 +11,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Protocol
 
 from automax_ros.core.numbers import nearest, stored_real
@@ -71,10 +72,15 @@ class Sine:
     hz: Fraction
     for_ns: int | None
 
+    @cached_property
+    def _cycle(self) -> int:
+        """One period, in ns times the numerator of ``hz``: whole numbers are computed much faster than fractions."""
+        return self.hz.denominator * NS_PER_S
+
     def value(self, elapsed_ns: int, _: Value) -> Value:
         """Return the sample; the phase is exact however long the wave lasts."""
-        phase = self.hz * elapsed_ns / NS_PER_S % 1
-        exact = self.mean + self.amplitude * math.sin(2.0 * math.pi * float(phase))
+        phase = self.hz.numerator * elapsed_ns % self._cycle
+        exact = self.mean + self.amplitude * math.sin(2.0 * math.pi * (phase / self._cycle))
         return nearest(exact) if self.type.is_integer else stored_real(exact)[0]
 
     def last(self) -> Value | None:
@@ -93,7 +99,7 @@ class Square:
 
     def value(self, elapsed_ns: int, _: Value) -> Value:
         """Return the level of this half period."""
-        half_periods = int(2 * self.hz * elapsed_ns / NS_PER_S)
+        half_periods = 2 * self.hz.numerator * elapsed_ns // (self.hz.denominator * NS_PER_S)
         return self.low if half_periods % 2 else self.high
 
     def last(self) -> Value | None:
