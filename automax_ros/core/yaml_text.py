@@ -32,6 +32,9 @@ _TOO_DEEP = "maximum nesting depth"
 _WHOLE = re.compile(r"-?(0|[1-9][0-9]{0,17})")
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _TRUTH = {"true": True, "false": False}
+_WORDS = frozenset(("true", "false", "yes", "no", "on", "off", "null", "y", "n"))
+_PLAIN = " _./()+-"
+"""What may stand next to letters and digits in a text without quotes."""
 
 
 Node: TypeAlias = "Scalar | YamlSequence | YamlMapping"
@@ -263,6 +266,12 @@ class _Reader:
     def _span(self, event: yaml.Event) -> Span:
         start, end = event.start_mark, event.end_mark
         return self._places.span(start.index, end.index) if start and end else Span(1, 1, 2)
+
+
+def flow_text(text: str) -> str:
+    """Return a printable text of one line as a value in a flow mapping, in quotes where it may be read otherwise."""
+    plain = text[:1].isalpha() and text == text.strip() and all(char.isalnum() or char in _PLAIN for char in text)
+    return text if plain and text.lower() not in _WORDS else "'" + text.replace("'", "''") + "'"
 
 
 def yaml_of(root: Node) -> str:

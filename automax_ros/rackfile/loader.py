@@ -23,6 +23,7 @@ from automax_ros.rackfile.reading.executive import EXECUTIVE, NEWEST
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.rackfile.reading.names import RACK_NAME, is_rack_name
 from automax_ros.rackfile.reading.values import (
+    MAX_FINDINGS,
     Entry,
     Key,
     ProblemList,
@@ -242,12 +243,12 @@ def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
     return _make_result(source, TaskReader(path, allow_outside, findings), path, findings)
 
 
-def load_stored(source: SourceText, path: Path) -> LoadResult:
+def load_stored(source: SourceText, path: Path, most_errors: int = MAX_FINDINGS) -> LoadResult:
     """Read a rack file from the text in a recording, with its sources under the names of their tasks.
 
-    ``path`` is the file's path in the configuration. No file is read.
+    ``path`` is the file's path in the configuration. No file is read. At most ``most_errors`` are reported.
     """
-    findings = ProblemList()
+    findings = ProblemList(most_errors)
     return _make_result(source, TaskReader(None, False, findings), path, findings)
 
 

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.yaml_text import Node, Scalar, YamlMapping, YamlSequence, read_yaml, yaml_of
+from automax_ros.core.text import printable
+from automax_ros.core.yaml_text import Node, Scalar, YamlMapping, YamlSequence, flow_text, read_data, read_yaml, yaml_of
 
 CONFIGS = sorted((Path(__file__).parents[2] / "config").glob("**/*.yaml"))
 HERE = Span(1, 1, 2)
@@ -61,3 +62,14 @@ TREES = st.recursive(
 @given(TREES)
 def test_any_tree_stays_what_it_is(root: Node):
     assert bare(read(yaml_of(root))) == bare(root)
+
+
+@given(st.text(max_size=12).map(printable) | st.sampled_from(("", "NULL", "no", "A: B", "A #B", "- A", "A ", "it's")))
+@settings(max_examples=300, deadline=None, derandomize=True, database=None)
+def test_any_printable_line_is_a_value_in_a_flow_mapping(text):
+    assert read_data(f"a: {{b: {flow_text(text)}, c: 1}} # {text}\n") == {"a": {"b": text, "c": "1"}}
+
+
+@pytest.mark.parametrize("text", ["PAPER", "LINE 1/2 (OLD)", "A.BAS"])
+def test_plain_words_need_no_quotes(text):
+    assert flow_text(text) == text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 
 _T = TypeVar("_T", int, float)
+_Key = TypeVar("_Key")
+_Value = TypeVar("_Value")
 
 
 _COMMA = re.compile(r",(?![^(\[]*[)\]])")
@@ -46,6 +48,20 @@ def option_number(option: str, text: str, low: float, high: float, what: str = "
         raise UsageError(f"{option}: {error}", f"give {what} from {low:.10g} to {high:.10g}") from None
     if not low <= found <= high:
         raise UsageError(f"{option}: {text} is not {what} from {low:.10g} to {high:.10g}")
+    return found
+
+
+def each_once(option: str, pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, _Value]:
+    """Return what an option that may be given again says, as a mapping.
+
+    Raises:
+        UsageError: it says two things of one key.
+    """
+    found: dict[_Key, _Value] = {}
+    for key, value in pairs:
+        if key in found:
+            raise UsageError(f"{option} {key} is given twice", "leave one of them out")
+        found[key] = value
     return found
 
 

@@ -17,7 +17,7 @@ import re
 import sys
 from pathlib import Path
 
-from automax_ros.cli.options.values import add_output_argument
+from automax_ros.cli.options.values import add_output_argument, each_once
 from automax_ros.cli.output.files import write_whole
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.cli.racks.import_folder import add_folder_arguments, import_folder, refuse_folder_options
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the rack file; 1 where lines could not be read, or `automax check` would find errors in it."""
-    modules = dict(_module(text) for text in arguments.modules)
+    modules = each_once("--module", map(_module, arguments.modules))
     if arguments.file.is_dir():
         return import_folder(arguments, modules)
     refuse_folder_options(arguments)

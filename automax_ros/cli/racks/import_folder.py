@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from automax_ros.cli.options.values import each_once, naming
 from automax_ros.cli.output.files import write_whole
 from automax_ros.cli.output.screen import painted, print_diagnostics, wants_colour
 from automax_ros.cli.racks.new import require_free
@@ -15,13 +16,12 @@ from automax_ros.cli.visible import write_control
 from automax_ros.core.diagnostics import SourceText, has_errors
 from automax_ros.core.problems import Severity
 from automax_ros.core.text import count_of, quoted
-from automax_ros.core.user_error import UsageError, UserError
-from automax_ros.rackfile.loader import load_stored
+from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.modules.registry import SUPPORTED, module_number
 from automax_ros.rackfile.old_plants.executive.dbase import CODE_PAGES
-from automax_ros.rackfile.old_plants.executive.fields import field_choice
+from automax_ros.rackfile.old_plants.executive.fields import FieldChoice, field_choice
 from automax_ros.rackfile.old_plants.executive.findings import Findings
-from automax_ros.rackfile.old_plants.executive.folders import FolderFault, chosen_rack, racks_in
+from automax_ros.rackfile.old_plants.executive.folders import chosen_rack, racks_in
 from automax_ros.rackfile.old_plants.executive.headers import headers_of
 from automax_ros.rackfile.old_plants.executive.importing import Choices, ImportedRack, import_rack
 from automax_ros.rackfile.old_plants.executive.parts import number_known
@@ -74,47 +74,44 @@ def refuse_folder_options(arguments: argparse.Namespace) -> None:
     Raises:
         UsageError: one is given.
     """
-    given = {
-        "--headers": arguments.headers,
-        "--rack": arguments.rack,
+    reads = {"--headers": arguments.headers, "--rack": arguments.rack, "--codepage": arguments.codepage}
+    for option, value in {**reads, **_choices(arguments)}.items():
+        if value:
+            raise UsageError(f"{option} is for the folder of a disk, and {arguments.file} is not a folder")
+
+
+def _choices(arguments: argparse.Namespace) -> dict[str, object]:
+    """Return the options that say what the tables do not, with what is given."""
+    return {
         "--part": arguments.parts,
         "--field": arguments.fields,
-        "--codepage": arguments.codepage,
         "--executive": arguments.executive,
         "--drive": arguments.drives,
     }
-    for option, value in given.items():
-        if value:
-            raise UsageError(f"{option} is for the folder of a disk, and {arguments.file} is not a folder")
 
 
 def import_folder(arguments: argparse.Namespace, modules: Mapping[int, str]) -> int:
     """Write the rack file and its tasks; 1 where something is lost, or the rack file has errors."""
     findings = Findings()
-    try:
-        if arguments.headers:
-            return _show_headers(arguments, findings)
-        choices = Choices(
-            parts=dict(map(_part, arguments.parts)),
-            modules=modules,
-            fields=[field_choice(text) for text in arguments.fields],
-            code_page=arguments.codepage,
-            executive=_executive(arguments.executive),
-            drives=dict(map(_drive, arguments.drives)),
-        )
-        place = chosen_rack(arguments.file, arguments.rack)
-        if arguments.output is not None:
-            _require_outside(arguments.output, place.rack.path)
-            require_free(arguments.output, force=arguments.force)
-        made = import_rack(place, choices, findings)
-    except (FolderFault, UserError) as fault:
-        raise UsageError(fault.message, fault.hint) from fault
+    if arguments.headers:
+        return _show_headers(arguments, findings)
+    choices = Choices(
+        parts=each_once("--part", map(_part, arguments.parts)),
+        modules=modules,
+        fields=_fields(arguments.fields),
+        code_page=arguments.codepage,
+        executive=_executive(arguments.executive),
+        drives=each_once("--drive", map(_drive, arguments.drives)),
+    )
+    place = chosen_rack(arguments.file, arguments.rack)
+    if arguments.output is not None:
+        _require_outside(arguments.output, place.rack.path)
+        require_free(arguments.output, force=arguments.force)
+    made = import_rack(place, choices, findings)
     _print(findings)
     if made.known:
         parts = " ".join(f"--part {code}={model}" for code, model in made.known.items())
         print(f"part codes: {parts}", file=sys.stderr)
-    name = str(arguments.output or "the rack file")
-    result = load_stored(SourceText(name, made.text), arguments.output or Path("rack.yaml"))
     if arguments.output is None:
         sys.stdout.write(made.text)
         if made.sources:
@@ -122,14 +119,19 @@ def import_folder(arguments: argparse.Namespace, modules: Mapping[int, str]) -> 
             print(f"--output DIR/rack.yaml writes the rack file, with its {text}", file=sys.stderr)
     else:
         _write(arguments.output, made, force=arguments.force)
-    print_diagnostics(result.diagnostics, result.source, sys.stderr)
-    wrong = findings.has_errors or has_errors(result.diagnostics)
+    source = SourceText(str(arguments.output or "the rack file"), made.text)
+    print_diagnostics(made.diagnostics, source, sys.stderr)
+    wrong = findings.has_errors or has_errors(made.diagnostics)
     if arguments.output is not None:
         print(f"next: automax check {arguments.output}")
     return 1 if wrong else 0
 
 
 def _show_headers(arguments: argparse.Namespace, findings: Findings) -> int:
+    writes = {"--output": arguments.output, "--force": arguments.force, "--module": arguments.modules}
+    for option, value in {**writes, **_choices(arguments)}.items():
+        if value:
+            raise UsageError(f"--headers goes without {option}", "it only shows the tables' fields: import afterwards")
     places = racks_in(arguments.file)
     if arguments.rack is not None or not places:
         places = [chosen_rack(arguments.file, arguments.rack)]
@@ -182,6 +184,14 @@ def _part(text: str) -> tuple[int, str]:
     if not number_known(number):
         raise UsageError(f"--part {quoted(text)}: there is no such module", f"there are {', '.join(SUPPORTED)}")
     return int(match[1]), number
+
+
+def _fields(texts: Sequence[str]) -> list[FieldChoice]:
+    """Return the fields that the user names: each of one thing, and each thing once."""
+    with naming("--field"):
+        choices = [field_choice(text) for text in texts]
+    each_once("--field", ((f"{item.table}.{item.field}", item) for item in choices))
+    return list(each_once("--field", ((f"{item.table}.{item.key}", item) for item in choices)).values())
 
 
 def _drive(text: str) -> tuple[str, str]:

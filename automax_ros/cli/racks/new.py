@@ -22,7 +22,7 @@ from automax_ros.core.user_error import UsageError
 from automax_ros.rackfile.checks.tasks import findings_by_task, with_findings
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.modules.processor import MAX_PROCESSORS
-from automax_ros.rackfile.old_plants.draft import Draft, DraftFault, draft
+from automax_ros.rackfile.old_plants.draft import Draft, draft
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,11 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     output = arguments.output if arguments.output is not None else folder / DEFAULT_RACK_FILE
     tick_ns = tick_option(arguments.tick_ms)
     require_free(output, force=arguments.force)
-    try:
-        drafted = draft(folder, output.parent, tick_ns, frozenset(name.upper() for name in arguments.udc))
-        write_whole(output, drafted.text(arguments.processors).encode(), over=arguments.force)
-    except DraftFault as fault:
-        raise UsageError(fault.message, fault.hint) from fault
+    drafted = draft(folder, output.parent, tick_ns, frozenset(name.upper() for name in arguments.udc))
+    write_whole(output, drafted.text(arguments.processors).encode(), over=arguments.force)
     counts = ((arguments.processors, "Processor"), (len(drafted.tasks), "task"), (len(drafted.commons), "common"))
     print(f"wrote {output}: {', '.join(count_of(number, thing) for number, thing in counts)}")
     for name, reason in drafted.left_out:

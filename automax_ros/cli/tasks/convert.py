@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from automax_ros.cli.options.task import TaskTarget, add_target_arguments, check_text, require_task, target_of
@@ -18,7 +18,7 @@ from automax_ros.cli.output.files import write_whole
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.user_error import UsageError
-from automax_ros.rackfile.old_plants.includes import include_reader
+from automax_ros.rackfile.old_plants.includes import include_files, include_reader
 from automax_ros.rackfile.old_plants.sources import Converted, convert
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 
@@ -44,7 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Convert all files, print the changes, and write the files if requested."""
     target = target_of(arguments)
     places = _places(arguments.files, arguments.output)
-    converted = [(path, _convert(path, target)) for path in arguments.files]
+    includes = {folder: include_files(folder) for folder in {path.parent for path in arguments.files}}
+    converted = [(path, _convert(path, target, includes[path.parent])) for path in arguments.files]
     wrong = 0
     for path, result in converted:
         print("\n".join(_difference(path, result)), end="\n" if result.before != result.after else "")
@@ -85,13 +86,13 @@ def _places(files: list[Path], folder: Path | None) -> dict[Path, Path]:
     return places
 
 
-def _convert(path: Path, target: TaskTarget) -> Converted:
+def _convert(path: Path, target: TaskTarget, includes: Mapping[str, Path]) -> Converted:
     require_task(path)
     try:
         data = read_bytes(path)
     except FileFault as fault:
         raise UsageError(f"{path} {fault}") from fault
-    return convert(data, lambda text: check_text(path, text, target).diagnostics, include_reader(path.parent))
+    return convert(data, lambda text: check_text(path, text, target).diagnostics, include_reader(includes))
 
 
 def _difference(path: Path, result: Converted) -> Iterator[str]:

@@ -25,6 +25,7 @@ from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_MS, UDC_TICK_NS
 from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataType, declaration_text
 from automax_ros.core.user_error import UserError
+from automax_ros.core.yaml_text import flow_text
 from automax_ros.language.checks.checker import CheckResult
 from automax_ros.language.parse.parser import parse
 from automax_ros.language.program import CommonSpec, Program, places_that_write
@@ -268,8 +269,7 @@ def _drive_modules(program: Program | None) -> list[tuple[int, str]]:
 
 
 def _file_key(task: DraftedTask) -> str:
-    quoted_file = "'" + task.file.replace("'", "''") + "'"
-    return "" if task.file == f"{task.name}.BLK" else f"file: {quoted_file}, "
+    return "" if task.file == f"{task.name}.BLK" else f"file: {flow_text(task.file)}, "
 
 
 def draft(folder: Path, rack_folder: Path, tick_ns: int, udc: frozenset[str] = frozenset()) -> Draft:
@@ -280,7 +280,7 @@ def draft(folder: Path, rack_folder: Path, tick_ns: int, udc: frozenset[str] = f
 
     Raises:
         DraftFault: the folder cannot be read, holds no task, or is not below ``rack_folder``, or ``udc`` names a task
-            that is not there.
+            that is not there or that no UDC runs.
     """
     try:
         inner = folder.resolve().relative_to(rack_folder.resolve())
@@ -295,6 +295,10 @@ def draft(folder: Path, rack_folder: Path, tick_ns: int, udc: frozenset[str] = f
         raise DraftFault(f"{folder} holds no task (.BLK, .BAS){reasons}")
     for name in sorted(udc.difference(_names(found))):
         raise DraftFault(f"{folder} holds no task {quoted(name)} for a UDC", did_you_mean(name, _names(found)))
+    for task in found.tasks:
+        if task.name in udc and not task.on_udc:
+            message = f"{task.file} is a BASIC task; a UDC runs control-block tasks (.BLK) only"
+            raise DraftFault(message, f"leave out --udc {task.name}: a Processor runs it")
     for task in found.tasks:
         tick, model = (UDC_TICK_NS, Model.UDC) if task.on_udc else (tick_ns, Model.NONE)
         found.results[task.name] = check_source(task.source, task.name, tick, found.commons, model)
@@ -329,7 +333,8 @@ def _take(found: Draft, path: Path, folder: Path, inner: Path, udc: frozenset[st
         return
     module, _ = parse(source)
     name = _task_name(path.stem, {task.name for task in found.tasks})
-    task = DraftedTask(name, str(inner / path.name), source, is_udc_task(module) or name in udc)
+    runs_on_udc = kind_of_source(path.name) is TaskKind.CONTROL_BLOCK and (is_udc_task(module) or name in udc)
+    task = DraftedTask(name, str(inner / path.name), source, runs_on_udc)
     found.tasks.append(task)
     for statement, *_ in statements_in_order(module.statements):
         if isinstance(statement, Declaration) and statement.scope is Scope.COMMON:

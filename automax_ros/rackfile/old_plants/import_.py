@@ -12,7 +12,7 @@ from automax_ros.rackfile.model.module import MAX_TASKS
 from automax_ros.rackfile.modules.registry import KINDS
 from automax_ros.rackfile.old_plants.configuration_task import Configuration, DefinedCommon, DefinedTask
 from automax_ros.rackfile.old_plants.draft import commented, rack_name
-from automax_ros.rackfile.old_plants.net_files import net_lines, quoted_for
+from automax_ros.rackfile.old_plants.net_files import NetLines, net_lines, quoted_for
 
 _PROCESSOR = "57C430A"
 """Replaces the 57C430 of a rack with a configuration task, which does not run this software (decision)."""
@@ -53,10 +53,10 @@ class _Importing:
     modules: Mapping[int, str]
     suffixes: Sequence[str]
     diagnostics: list[Diagnostic] = field(default_factory=list)
-    _net_lines: Mapping[str, str] = field(default_factory=dict)
+    _net: NetLines = field(default_factory=NetLines)
 
     def result(self, title: str) -> Imported:
-        self._net_lines = net_lines(self.folder)
+        self._net = net_lines(self.folder)
         lines = [
             "# Made from a configuration task; docs/rack_yaml.md has every key.",
             f"rack: {rack_name(title)}",
@@ -65,6 +65,7 @@ class _Importing:
             *self._slots(),
             "common:" if self.configuration.commons else "common: {}",
             *map(self._common, self.configuration.commons),
+            *(f"# {name} {reason}: not read" for name, reason in self._net.left_out),
         ]
         return Imported("\n".join(lines) + "\n", self.diagnostics)
 
@@ -133,7 +134,7 @@ class _Importing:
         text = declaration_text(declared.name, declared.dimensions, declared.length)
         if point is None:
             options = "{non_volatile: true}" if common.non_volatile else "{}"
-            line = quoted_for(declared.name, self._net_lines) if common.keyword not in _IN_MEMORY else ""
+            line = quoted_for(declared.name, self._net.lines) if common.keyword not in _IN_MEMORY else ""
             return commented(f"  {text}: {options}", f"{common.keyword}, line {common.line}{line}")
         place = f"slot: {point.slot}, " + ("" if common.drop is None else f"drop: {common.drop}, ")
         place += f"register: {point.register}"

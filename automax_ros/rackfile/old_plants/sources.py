@@ -6,7 +6,6 @@ not understood is not changed.
 
 from __future__ import annotations
 
-import codecs
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -19,6 +18,7 @@ from automax_ros.language.text.constants import STRING_LIMIT
 from automax_ros.language.text.lexer import END_OF_FILE, LineReader
 from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
 from automax_ros.language.text.tokens import Token, TokenKind
+from automax_ros.rackfile.old_plants.decoding import ONE_BYTE, decoded
 from automax_ros.rackfile.old_plants.includes import Included, ReadInclude, with_includes
 
 Check = Callable[[str], Iterable[Diagnostic]]
@@ -31,9 +31,6 @@ _TAB = 8
 """Columns from one tab stop to the next, as DOS has them."""
 _MOST_ROUNDS = 50
 """Most passes over a text until nothing changes any more (decision: a bound on untrusted texts)."""
-_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-
-
 _Cure = Callable[[str, str], str | None]
 
 
@@ -57,19 +54,19 @@ class Converted:
         return bool(self.notes)
 
 
-def convert(data: bytes, check: Check, read_include: ReadInclude | None = None) -> Converted:
+def convert(data: bytes, check: Check, read_include: ReadInclude | None = None, code_page: str = ONE_BYTE) -> Converted:
     """Return a source made acceptable; ``check`` finds what is left to change, ``read_include`` reads include files.
 
-    UTF-16 becomes UTF-8; a byte order mark, and Ctrl-Z with all that follows, where DOS stops reading, are left out; CR
-    LF and CR become LF. Control characters become blanks. Outside of texts between quotes tabs become blanks up to the
-    next multiple of 8 columns, and, outside of remarks, lower case becomes upper case. REAL constants of blocks get
-    their decimal point, lengths of strings above 255 become 255 and a length of 0, which meant the default, is removed;
-    a text of PRINT with more than 132 characters is printed in parts (decision: what an old Executive took, and the
-    file of a DOS editor).
+    UTF-16, and a text of a ``code_page`` that is given, become UTF-8; a byte order mark, and Ctrl-Z with all that
+    follows, where DOS stops reading, are left out; CR LF and CR become LF. Control characters become blanks. Outside of
+    texts between quotes tabs become blanks up to the next multiple of 8 columns, and, outside of remarks, lower case
+    becomes upper case. REAL constants of blocks get their decimal point, lengths of strings above 255 become 255 and a
+    length of 0, which meant the default, is removed; a text of PRINT with more than 132 characters is printed in parts
+    (decision: what an old Executive took, and the file of a DOS editor).
     """
-    text, encoding, notes = _decode(data)
-    text, _, rest = text.partition(END_OF_FILE)
-    if rest or END_OF_FILE in data.decode("latin-1"):
+    text, encoding, notes = decoded(data, code_page)
+    text, end, rest = text.partition(END_OF_FILE)
+    if end:
         notes.append(f"Ctrl-Z and the {count_of(len(rest), 'character')} after it left out")
     ends = text.count("\r\n") + text.replace("\r\n", "").count("\r")
     before = text.replace("\r\n", "\n").replace("\r", "\n")
@@ -94,21 +91,6 @@ def _encoded(text: str, encoding: str) -> bytes:
         return text.encode(encoding)
     except UnicodeEncodeError:
         return text.encode()
-
-
-def _decode(data: bytes) -> tuple[str, str, list[str]]:
-    """Return the text, the encoding to write it in, and notes; bytes that are not UTF-8 become one character each."""
-    if data.startswith(_UTF_16):
-        try:
-            return data.decode("utf-16"), "utf-8", ["UTF-16 written as UTF-8"]
-        except UnicodeDecodeError:
-            return data.decode("latin-1"), "latin-1", []
-    notes = ["byte order mark left out"] if data.startswith(codecs.BOM_UTF8) else []
-    plain = data.removeprefix(codecs.BOM_UTF8)
-    try:
-        return plain.decode(), "utf-8", notes
-    except UnicodeDecodeError:
-        return plain.decode("latin-1"), "latin-1", notes
 
 
 def _without_control(text: str, counts: Counter[str]) -> str:

@@ -30,10 +30,11 @@ Entry = tuple[Scalar, Node]
 
 
 class ProblemList:
-    """The diagnostics of one file so far."""
+    """The diagnostics of one file so far: at most ``most_errors`` errors and ``MAX_FINDINGS`` warnings."""
 
-    def __init__(self) -> None:
+    def __init__(self, most_errors: int = MAX_FINDINGS) -> None:
         self._items: dict[Severity, list[Diagnostic]] = {Severity.ERROR: [], Severity.WARNING: []}
+        self._most = {Severity.ERROR: most_errors, Severity.WARNING: MAX_FINDINGS}
         self._refused: set[Span] = set()
         self._lower_case = False
 
@@ -41,8 +42,9 @@ class ProblemList:
         """Report a problem, unless the YAML at this very place was already refused."""
         if span in self._refused:
             return
-        items = self._items[PROBLEMS[code].severity]
-        if len(items) < MAX_FINDINGS:
+        severity = PROBLEMS[code].severity
+        items = self._items[severity]
+        if len(items) < self._most[severity]:
             items.append(Diagnostic(code, message, span, hint=hint, notes=notes))
 
     def refuse(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
@@ -66,7 +68,7 @@ class ProblemList:
 
     @property
     def errors(self) -> int:
-        """Number of errors so far, at most MAX_FINDINGS."""
+        """Number of errors so far, at most ``most_errors``."""
         return len(self._items[Severity.ERROR])
 
     def in_order(self) -> list[Diagnostic]:

@@ -73,9 +73,10 @@ _ROS = Key(
 RATE = number_key("rate_limit_hz", "Most messages per second on the topic.", 0.01, 2000.0, "AMX6408")
 """Range of `rate_limit_hz`, 0.01 to 2000 Hz (decision: 2000 Hz is one message per tick of 0.5 ms)."""
 _NON_VOLATILE = flag_key("non_volatile", "Whether the value survives STOP ALL, a power cycle and a restart.")
+DESCRIPTION_LIMIT = 200
 UNIT, DESCRIPTION = (
     text_key("unit", line("The engineer's unit.", 16)),
-    text_key("description", line("A line about the variable.", 200), 200),
+    text_key("description", line("A line about the variable.", DESCRIPTION_LIMIT), DESCRIPTION_LIMIT),
 )
 """Longest `unit` and longest `description`, 16 and 200 characters (decision)."""
 OPTIONS: Keys = {

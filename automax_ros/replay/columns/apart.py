@@ -1,8 +1,8 @@
 """Executes by columns what an edited task does where its values are no longer the recorded ones, and counts that.
 
 The task gets the recorded inputs, and of its own outputs what it has left itself. It goes scan by scan where somebody
-else writes these outputs, where it reads or writes beside its latch what the recorded one did not, and where something
-differs for the first time.
+else writes these outputs, where a statement reads or writes what the recorded one did not, and where something differs
+for the first time.
 """
 
 from __future__ import annotations
@@ -143,13 +143,13 @@ class ApartStretches:
         if views is None or (counted and memory.apart and not self._replay.has_compared):
             return None
         scans = scans.part(0, self._before_others(scans, writes, views))
-        beside = [place for place in sorted(memory.unrecorded) if form.views[place] not in views]
-        known = self._memory(scans, writes, [*views.tolist(), *form.views[beside].tolist()])
+        unlatched = [place for place in sorted(memory.unrecorded) if form.views[place] not in views]
+        known = self._memory(scans, writes, [*views.tolist(), *form.views[unlatched].tolist()])
         if known is None:
             return None
         recorded_latch = form.latched.columns(scans.latched, [int(value) for value in memory.latched_last])
         latched = recorded_latch.copy()
-        latched[beside] = known[len(views) :]
+        latched[unlatched] = known[len(views) :]
         own = known[: len(views), 0].copy()
         for (view, _), value in memory.apart.items():
             own[np.searchsorted(views, view)] = int(value)
@@ -166,7 +166,7 @@ class ApartStretches:
         return prepared.part(count) if count >= FEWEST_SCANS else None
 
     def _plain(self, scans: ScanColumns) -> int:
-        """Return how many scans follow each other and write nothing beside their latch."""
+        """Return how many scans follow each other and write nothing outside of their latch."""
         if not len(scans) or not self._commons.unforced_since(int(scans.stamps.min())):
             return 0
         following = scans.scans - np.arange(len(scans)) == self._replay.last_scan + 1

@@ -37,7 +37,7 @@ def test_everything_that_is_not_sure_is_told_with_its_code(floppy):
     result = floppy("import", "floppy")
     for code in ("AMX6791", "AMX6792", "AMX6794", "AMX6795"):
         assert f"warning[{code}]" in result.err
-    assert "  hint: read it on the module: --part 20=57C402, or --module 6=57C402\n" in result.err
+    assert "  hint: read its number on the module: --part 20=NUMBER, or --module 6=NUMBER\n" in result.err
     assert (
         "part codes: --part 1=57C413 --part 2=57C435 --part 3=57C435 --part 10=57C404 --part 40=57552\n" in result.err
     )
@@ -129,6 +129,18 @@ def test_headers_name_nothing_of_the_plant(floppy):
         (["floppy", "--part", "5=57C999"], "there is no such module"),
         (["floppy", "--field", "registr=X"], "'registr' is nothing that $SWVAR has"),
         (["floppy", "--drive", "WIND_A=C"], "'WIND_A=C' is not a task and A or B"),
+        (["floppy", "--part", "5=57C419", "--part", "05=57C403"], "--part 5 is given twice"),
+        (["floppy", "--module", "5=57C419", "--module", "5=57C403"], "--module 5 is given twice"),
+        (["floppy", "--drive", "WIND_A=A", "--drive", "wind_a=B"], "--drive WIND_A is given twice"),
+        (["floppy", "--field", "register=A", "--field", "SWVAR.register=B"], "--field SWVAR.register is given twice"),
+        (["floppy", "--field", "register=A", "--field", "bit=a"], "--field SWVAR.A is given twice"),
+        (["floppy", "--headers", "--output", "new/rack.yaml"], "--headers goes without --output"),
+        (["floppy", "--headers", "--force"], "--headers goes without --force"),
+        (["floppy", "--headers", "--field", "register=A"], "--headers goes without --field"),
+        (["floppy", "--headers", "--part", "5=57C419"], "--headers goes without --part"),
+        (["floppy", "--headers", "--module", "5=57C419"], "--headers goes without --module"),
+        (["floppy", "--headers", "--drive", "WIND_A=A"], "--headers goes without --drive"),
+        (["floppy", "--headers", "--executive", "3.8"], "--headers goes without --executive"),
         (["floppy", "--executive", "2.1"], "'2.1' is not a version with databases"),
         (["floppy", "--executive", "new"], "'new' is not a version with databases"),
         (["floppy", "--codepage", "utf-8"], "--codepage"),

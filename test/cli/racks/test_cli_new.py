@@ -176,7 +176,7 @@ def test_a_basic_task_gets_the_least_priority(plant):
     plant.write("plant/WATCH.BAS", "10 START EVERY 1 SECONDS\n20 PRINT 1\n30 END\n")
     assert plant("new", "plant").code == 0
     text = (plant.folder / "plant" / "rack.yaml").read_text()
-    assert "WATCH: {file: 'WATCH.BAS', priority: 6} # a BASIC task" in text
+    assert "WATCH: {file: WATCH.BAS, priority: 6} # a BASIC task" in text
     (processor,) = loaded("plant/rack.yaml").task_modules
     assert {task.file.name for task in processor.tasks} == {"FAST.BLK", "SLOW.BLK", "WATCH.BAS"}
 
@@ -283,3 +283,16 @@ def test_a_task_that_only_the_user_knows_to_be_a_udcs_stands_on_one(automax):
     assert tasks == {"LINE": "57C435", "WIND_A": "57552"}
     result = automax("new", "plant", "--udc", "WIND_B", "--force")
     assert (result.code, "plant holds no task 'WIND_B' for a UDC" in result.err) == (2, True)
+
+
+def test_a_basic_task_is_none_for_a_udc(automax):
+    (automax.folder / "plant").mkdir()
+    automax.write("plant/LINE.BLK", "10 COMMON REF%\n20 CALL SCAN_LOOP(TICKS=4)\n30 END\n")
+    automax.write("plant/B1.BAS", "10 COMMON REF%\n20 PRINT REF%\n30 END\n")
+    result = automax("new", "plant", "--udc", "b1")
+    assert result.code == 2
+    assert result.err.endswith(
+        "B1.BAS is a BASIC task; a UDC runs control-block tasks (.BLK) only\n"
+        "  hint: leave out --udc B1: a Processor runs it\n"
+    )
+    assert not (automax.folder / "plant" / "rack.yaml").exists()

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.rackfile.old_plants.includes import include_reader, with_includes
+from automax_ros.rackfile.old_plants.includes import include_files, include_reader, with_includes
 from automax_ros.rackfile.old_plants.sources import convert
 
 TASK = "10 COMMON A%\n20 {}\n90 END\n"
@@ -64,13 +64,48 @@ def test_texts_and_remarks_that_say_include_stay():
 
 def test_convert_inlines_what_lies_next_to_the_task(tmp_path):
     (tmp_path / "head.inc").write_bytes("30 ! GR\u00dcSSE\r\n".encode("latin-1"))
-    result = convert(TASK.format("INCLUDE HEAD").encode(), lambda _: [], include_reader(tmp_path))
+    result = convert(TASK.format("INCLUDE HEAD").encode(), lambda _: [], include_reader(include_files(tmp_path)))
     assert result.after == "10 COMMON A%\n20 ! INCLUDE HEAD.INC\n30 ! GR\u00dcSSE\n90 END\n"
     assert result.notes == ("HEAD.INC written in place of its INCLUDE",)
-    assert convert(result.data, lambda _: [], include_reader(tmp_path)).changed is False
+    assert convert(result.data, lambda _: [], include_reader(include_files(tmp_path))).changed is False
 
 
 @given(st.text(alphabet="1234567890 INCLUDEHA.\n'&", max_size=80), st.text(alphabet="1230 INCLUDEA.\n&", max_size=60))
 @settings(max_examples=150, deadline=None, derandomize=True, database=None)
 def test_whatever_the_texts_it_ends(text, other):
     with_includes(text, lambda _: other)
+
+
+def test_a_file_that_is_named_very_often_is_read_once_and_its_numbers_are_looked_at_once():
+    """Each INCLUDE on its own would look at 40,000 lines, and at the rest of the task."""
+    calls = []
+
+    def read(name):
+        calls.append(name)
+        return "A% = 1\n" * 40_000
+
+    found = with_includes("\n".join(f"{number} INCLUDE HEAD" for number in range(1, 20_001)), read)
+    assert (calls, len(found.refused)) == (["HEAD.INC"], 20_000)
+
+
+def test_include_files_together_have_a_bound():
+    found = with_includes("10 INCLUDE A\n20 INCLUDE B\n30 INCLUDE C\n", lambda _: "!" + "x" * 1_100_000 + "\n")
+    assert [reason.partition(": ")[2] for reason in found.refused][-2:] == [
+        "the include files have more than 2000000 characters"
+    ] * 2
+
+
+def test_what_an_include_file_includes_fits_in_its_place_too():
+    files = {"HEAD.INC": "30 INCLUDE MORE\n", "MORE.INC": "31 A% = 1\n95 A% = 2\n"}
+    found = included("INCLUDE HEAD", files)
+    assert found.refused == ["'MORE.INC' stays out: its line numbers do not fit between 30 and 90; renumber it"]
+
+
+def test_include_files_are_those_of_the_folder_in_any_case(tmp_path):
+    folder = tmp_path / "plant"
+    folder.mkdir()
+    (tmp_path / "SECRET.INC").write_text("30 ! SECRET\n")
+    (folder / "OUT.INC").symlink_to(tmp_path / "SECRET.INC")
+    (folder / "head.inc").write_bytes("30 ! GR\u00dcSSE\n".encode("utf-16"))
+    read = include_reader(include_files(folder))
+    assert (read("HEAD.INC"), read("OUT.INC")) == ("30 ! GR\u00dcSSE\n", None)

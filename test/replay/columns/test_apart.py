@@ -69,7 +69,7 @@ EDITS = {
         ("160 END", "155 IF LAST% > 200 THEN NIL% = 1 / NIL%\n160 END"),
     ),
     "another's output": (("20 LOCAL", "15 COMMON COPY%\n20 LOCAL"), ("OUTPUT=OUT%", "OUTPUT=COPY%")),
-    "a write beside the latch": (("160 END", "155 IF OUT% > 150 THEN OUT% = 7\n160 END"),),
+    "a write outside of the latch": (("160 END", "155 IF OUT% > 150 THEN OUT% = 7\n160 END"),),
     "a statement that writes": (("20 LOCAL", "15 COMMON NEW%\n20 LOCAL"), ("160 END", "155 NEW% = FILTERED%\n160 END")),
     "an array": (("20 LOCAL", "15 COMMON T%(3)\n20 LOCAL"), ("160 END", "155 T%(0) = FILTERED%\n160 END")),
     "an end": (("160 END", "155 IF LAST% > 20000 THEN STOP\n160 END"),),
@@ -113,7 +113,7 @@ WRITES = "156 IF A% > 250 THEN NEW% = A%\n"
 
 
 def with_statements(read: str) -> str:
-    """The task with statements beside its latch, which read an output or a local."""
+    """The task with statements outside of its latch, which read an output or a local."""
     return edited(
         SPEED,
         ("LAST%\n20", "LAST%, NEW%\n20"),
@@ -151,7 +151,7 @@ def test_each_edit_gives_the_report_of_scan_by_scan(bag: Path, edit: str, form: 
         ("INPUT2=300", "INPUT2=400"),
     ],
 )
-def test_statements_beside_the_latch_too(statements: tuple[Path, str], change: tuple[str, str], form: str):
+def test_statements_outside_of_the_latch_too(statements: tuple[Path, str], change: tuple[str, str], form: str):
     bag, text = statements
     assert not report(bag, edited(text, change), FORMS[form]).identical
 

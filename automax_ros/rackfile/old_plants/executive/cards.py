@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from automax_ros.core.text import printable
+from automax_ros.core.text import quoted
 from automax_ros.core.ticks import MAX_TICK_NS, NS_PER_MS, NS_PER_US, TICK_STEP_NS
+from automax_ros.core.yaml_text import flow_text
 from automax_ros.rackfile.modules.network import MASTER
 from automax_ros.rackfile.modules.registry import NOT_YET, REFUSED
 from automax_ros.rackfile.old_plants.executive.fields import Record
@@ -36,7 +37,7 @@ def tick_keys(card: Record, findings: Findings) -> list[str]:
 def network_keys(card: Record) -> str:
     """Return the keys of a 57C404 that follow its number."""
     drop, depth = card.whole("net_drop"), card.whole("depth")
-    keys = f", network: {card.text('network') or 'NET'}, drop: {MASTER if drop is None else drop}"
+    keys = f", network: {flow_text(card.text('network') or 'NET')}, drop: {MASTER if drop is None else drop}"
     return keys + (f", depth: {depth}" if drop and depth and depth > 1 else "")
 
 
@@ -50,8 +51,7 @@ def why_not(module: OldModule) -> str:
 
 def comment_of(text: str) -> str:
     """Return a text for a comment: one line, not too long."""
-    plain = printable(text)
-    return plain if len(plain) <= _LONGEST_COMMENT else plain[: _LONGEST_COMMENT - 3] + "..."
+    return quoted(text, marks="", limit=_LONGEST_COMMENT)
 
 
 def described(record: Record) -> str:
@@ -65,12 +65,3 @@ def values_of(record: Record) -> str:
     """Return all values of a record that are not blank, for a comment."""
     shown = ((key, record.text(key)) for key in record.values)
     return ", ".join(f"{key} {text}" for key, text in shown if text)
-
-
-def yaml_text(text: str) -> str:
-    """Return a text as a value in a flow mapping of YAML."""
-    plain = text[:1].isalpha() and all(char.isalnum() or char in " _./()+-" for char in text)
-    return text if plain and text.lower() not in _YAML_WORDS else "'" + text.replace("'", "''") + "'"
-
-
-_YAML_WORDS = frozenset(("true", "false", "yes", "no", "on", "off", "null", "y", "n"))

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from automax_ros.core.text import quoted
 from automax_ros.core.types import DataType
+from automax_ros.core.yaml_text import flow_text
 from automax_ros.rackfile.modules.registry import SUPPORTED
-from automax_ros.rackfile.old_plants.executive.cards import yaml_text
 from automax_ros.rackfile.old_plants.executive.document import Entry
 from automax_ros.rackfile.old_plants.executive.findings import Unplaced
 from automax_ros.rackfile.old_plants.executive.parts import NETWORK, PROCESSORS, OldModule, is_memory
 from automax_ros.rackfile.old_plants.executive.variables import OldVariable
 from automax_ros.rackfile.old_plants.net_files import quoted_for
+from automax_ros.rackfile.sections.commons import DESCRIPTION_LIMIT
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class CommonEntries:
 
     def _common(self, variable: OldVariable) -> Entry:
         record = variable.record
-        options = [] if not variable.description else [f"description: {yaml_text(variable.description)}"]
+        options = [f"description: {flow_text(self._description(variable))}"] if variable.description else []
         plain = f"{variable.text}: {{{', '.join(options)}}}"
         if variable.non_volatile:
             options.insert(0, "non_volatile: true")
@@ -58,6 +60,13 @@ class CommonEntries:
             entry.lessen(reason)
             self.unplaced.add(record.file, f"a plain common: {reason}", record.number)
         return entry
+
+    def _description(self, variable: OldVariable) -> str:
+        """Return a variable's description as long as a rack file may have one; one that is cut is told."""
+        if len(variable.description) > DESCRIPTION_LIMIT:
+            reason = f"the end of the description, which has more than {DESCRIPTION_LIMIT} characters, is left out"
+            self.unplaced.add(variable.record.file, reason, variable.record.number)
+        return quoted(variable.description, marks="", limit=DESCRIPTION_LIMIT)
 
     def _where(self, variable: OldVariable) -> tuple[list[str], str]:
         """Return the keys of a variable's place, none for common memory, and why it lacks the place it should have."""

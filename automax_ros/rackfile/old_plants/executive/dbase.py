@@ -225,9 +225,6 @@ class _Reader:
     def _rows(self, start: int, width: int) -> Iterator[Row]:
         data, place, number, cut = self._data, start, 0, 0
         while place < len(data):
-            if number >= MAX_RECORDS:
-                self._tell(f"the table has more than {MAX_RECORDS} records: the others are not read", lost=True)
-                return
             rest = len(data) - place
             if data[place] == _END and (number >= self._count or not data[place:].strip(b"\x1a\0")):
                 break
@@ -239,6 +236,9 @@ class _Reader:
                 break
             if number >= self._count and data[place] not in (_BLANK, _DELETED):
                 break
+            if number >= MAX_RECORDS:
+                self._tell(f"the table has more than {MAX_RECORDS} records: the others are not read", lost=True)
+                return
             number += 1
             yield Row(number, data[place : place + width])
             place += width
@@ -263,11 +263,11 @@ class _Reader:
             self._tell("the mark 1Ah at the end of the file is missing")
 
     def _tell_flags(self, rows: tuple[Row, ...]) -> None:
-        odd = [row.number for row in rows if row.data[0] not in (_BLANK, _DELETED)]
+        odd = [row for row in rows if row.data[0] not in (_BLANK, _DELETED)]
         if odd:
-            flags = ", ".join(sorted({f"{row.data[0]:02X}h" for row in rows if row.number in set(odd)})[:3])
-            message = f"{records_text(odd)}: the flag in front is {flags}, neither a blank nor `*`: kept"
-            self._tell(message, odd[0])
+            flags = ", ".join(sorted({f"{row.data[0]:02X}h" for row in odd})[:3])
+            numbers = records_text(row.number for row in odd)
+            self._tell(f"{numbers}: the flag in front is {flags}, neither a blank nor `*`: kept", odd[0].number)
 
 
 _AGAIN = "the file is damaged or is not a dBASE table: copy it from the disk again, or from the backup"

@@ -5,18 +5,22 @@ So the rules of rack files have one home: the importer asks the reader.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.problems import Severity
+from automax_ros.core.user_error import UserError
+from automax_ros.core.yaml_text import MAX_NODES
 from automax_ros.rackfile.loader import load_stored
 from automax_ros.rackfile.old_plants.draft import commented
 from automax_ros.rackfile.old_plants.executive.findings import Findings
+from automax_ros.rackfile.reading.files import MAX_BYTES
 
 _MOST_ROUNDS = 60
 """Most readings of the rack file until nothing is refused any more (decision: a bound on untrusted files)."""
+_SIZE, _TOO_MANY_TASKS = "AMX6005", "AMX6303"
 _WHOLE, _PLAIN, _COMMENT = range(3)
 _NEVER_PLAIN = {ord(char): None for char in "\r\n"}
 
@@ -56,11 +60,6 @@ class Entry:
     def is_comment(self) -> bool:
         """Whether only a comment is left."""
         return self.level == _COMMENT
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether it is as it should be."""
-        return self.level == _WHOLE
 
     def text(self, indent: int) -> str:
         """Return the line."""
@@ -142,29 +141,67 @@ class Document:
         yield from ((f"# {line}", None) for line in self.tail)
 
     def text(self) -> str:
-        """Return the whole file."""
-        return "".join(line.translate(_NEVER_PLAIN) + "\n" for line, _ in self.lines())
+        """Return the whole file.
+
+        Raises:
+            UserError: it would have more bytes than a rack file may have.
+        """
+        text = "".join(line.translate(_NEVER_PLAIN) + "\n" for line, _ in self.lines())
+        if len(text.encode()) > MAX_BYTES:
+            raise _too_large(f"more than {MAX_BYTES} bytes")
+        return text
 
     def settle(self, findings: Findings) -> list[Diagnostic]:
-        """Lessen what the reader of rack files refuses, tell it, and return the errors that stay.
+        """Lessen what the reader of rack files refuses, tell it, and return what the reader says of the rest.
 
         What becomes a comment is lost (AMX6789), what becomes a plain common loses its place (AMX6795).
+
+        Raises:
+            UserError: the rack file would be larger than one may be.
         """
+        found = self._read(findings)
         for _ in range(_MOST_ROUNDS):
-            for module in self.modules:
-                module.leave_out_tasks(findings)
-            entries = [entry for _, entry in self.lines()]
-            found = load_stored(SourceText("rack.yaml", self.text()), Path("rack.yaml")).diagnostics
-            errors = [item for item in found if item.severity is Severity.ERROR]
-            lessened: set[int] = set()
-            for item in errors:
-                entry = entries[item.span.line - 1] if item.span.line <= len(entries) else None
-                if entry is None or id(entry) in lessened or not entry.lessen(item.message):
+            if not self._lessen(found, findings):
+                break
+            found = self._read(findings)
+        return found
+
+    def _read(self, findings: Findings) -> list[Diagnostic]:
+        """Return all errors, and the first warnings, of the file as it is."""
+        for module in self.modules:
+            module.leave_out_tasks(findings)
+        found = load_stored(SourceText("rack.yaml", self.text()), Path("rack.yaml"), MAX_NODES).diagnostics
+        for item in found:
+            if item.code == _SIZE:
+                raise _too_large(item.message)
+        return found
+
+    def _lessen(self, found: Iterable[Diagnostic], findings: Findings) -> bool:
+        """Lessen the things with errors, each once, and tell them; FALSE if there are none."""
+        entries = [entry for _, entry in self.lines()]
+        lessened: set[int] = set()
+        for item in found:
+            for entry in _refused(item, entries):
+                if id(entry) in lessened or not entry.lessen(item.message):
                     continue
                 lessened.add(id(entry))
                 code, form = ("AMX6789", "a comment") if entry.is_comment else ("AMX6795", "a plain common")
                 message = f"{entry.name} becomes {form} of the rack file: {item.message}"
                 findings.add(code, message, entry.file, entry.record)
-            if not lessened:
-                return errors
-        return errors
+        return bool(lessened)
+
+
+def _refused(item: Diagnostic, entries: Sequence[Entry | None]) -> Iterator[Entry]:
+    """Yield what an error refuses: what its line stands for, and after the first task too many the module's others."""
+    if item.severity is not Severity.ERROR:
+        return
+    for place in range(item.span.line - 1, len(entries)):
+        entry = entries[place]
+        if entry is not None:
+            yield entry
+        if item.code != _TOO_MANY_TASKS or entry is None or isinstance(entry, ModuleEntry):
+            return
+
+
+def _too_large(what: str) -> UserError:
+    return UserError(f"the rack file would have {what}", "is this one rack?")

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from automax_ros.core.problems import PROBLEMS, Severity
-from automax_ros.core.text import printable
+from automax_ros.core.text import printable, visible
 
 MOST_FINDINGS = 1000
 """Most findings that are kept (decision: a bound on untrusted files)."""
@@ -36,7 +36,7 @@ class Finding:
 
     def __str__(self) -> str:
         hint = f"\n  hint: {self.hint}" if self.hint else ""
-        return printable_lines(f"{self.place}: {self.severity.value}[{self.code}]: {self.message}{hint}")
+        return visible(f"{self.place}: {self.severity.value}[{self.code}]: {self.message}{hint}")
 
 
 @dataclass
@@ -92,11 +92,6 @@ class Unplaced:
         """Tell all, in the order of the first record of each reason."""
         for (code, file, reason), numbers in self.records.items():
             findings.add(code, f"{records_text(numbers)}: {reason}", file, numbers[0])
-
-
-def printable_lines(text: str) -> str:
-    """Return a text of several lines without control characters."""
-    return "\n".join(map(printable, text.split("\n")))
 
 
 def records_text(numbers: Iterable[int]) -> str:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 from automax_ros.core.text import count_of, did_you_mean, quoted
@@ -31,10 +33,14 @@ class FolderFault(UserError):
 
 @dataclass(frozen=True)
 class DiskFolder:
-    """A folder with its files by their names in upper case; of names that differ in case only the first counts."""
+    """A folder with its files by their names in upper case; of names that differ in case only the first counts.
+
+    ``folders`` are those in it.
+    """
 
     path: Path
     files: Mapping[str, Path] = field(default_factory=dict)
+    folders: Sequence[Path] = ()
 
     def table(self, name: str) -> Path | None:
         """Return the file of a table, such as that of ``CARD``."""
@@ -62,14 +68,18 @@ class RackPlace:
 def racks_in(folder: Path) -> list[RackPlace]:
     """Return the racks in a folder and below it, in the order of their paths.
 
+    Where the folder above cannot be read, the system is taken to be missing.
+
     Raises:
         FolderFault: the folder cannot be read, or it and those below it hold more entries than are looked at.
     """
-    found: list[RackPlace] = []
     folder = Path(os.path.abspath(folder))
-    above = _system(_contents(folder.parent, [])) if folder.parent != folder else None
-    _search(folder, above, found, [], 0)
-    return found
+    above: DiskFolder | None = None
+    with suppress(FolderFault):
+        above = _system(_contents(folder.parent)[0]) if folder.parent != folder else None
+    search = _Search()
+    search.walk(folder, above)
+    return search.found
 
 
 def chosen_rack(folder: Path, name: str | None) -> RackPlace:
@@ -81,7 +91,7 @@ def chosen_rack(folder: Path, name: str | None) -> RackPlace:
     racks = racks_in(folder)
     if not racks:
         hint = "it is a folder with $CARD.DBF, $TASKS.DBF and $SWVAR.DBF, or one above it"
-        if any(path.suffix.upper() == ".CNF" for path in _contents(folder, []).files.values()):
+        if any(path.suffix.upper() == ".CNF" for path in _contents(folder)[0].files.values()):
             hint = "it holds a configuration task, of Executive 2.1 or before: automax import FILE.CNF"
         raise FolderFault(f"{folder} holds no rack of a Programming Executive", hint)
     titles = [rack.title for rack in racks]
@@ -97,38 +107,49 @@ def chosen_rack(folder: Path, name: str | None) -> RackPlace:
     raise FolderFault(f"--rack {quoted(asked)}: {folder} holds no such rack", hint)
 
 
-def _contents(folder: Path, seen: list[int]) -> DiskFolder:
-    try:
-        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
-    except (OSError, ValueError) as error:
-        if seen:
-            return DiskFolder(folder)
-        raise FolderFault(f"{folder} cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    seen.append(len(entries))
-    if sum(seen) > _MOST_ENTRIES:
-        raise FolderFault(f"{folder} and the folders in it hold more than {_MOST_ENTRIES} files", "name a folder of it")
+def _contents(folder: Path) -> tuple[DiskFolder, int]:
+    """Return a folder, and how many entries it has as far as they are looked at.
+
+    Raises:
+        FolderFault: it cannot be read.
+    """
     files: dict[str, Path] = {}
-    for entry in entries:
-        if entry.is_file(follow_symlinks=False):
-            files.setdefault(entry.name.upper(), folder / entry.name)
-    return DiskFolder(folder, files)
-
-
-def _folders(folder: Path) -> Sequence[Path]:
+    inner: list[Path] = []
     try:
-        return sorted(folder / entry.name for entry in os.scandir(folder) if entry.is_dir(follow_symlinks=False))
-    except (OSError, ValueError):
-        return []
+        with os.scandir(folder) as scan:
+            entries = sorted(islice(scan, _MOST_ENTRIES + 1), key=lambda entry: entry.name)
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                inner.append(folder / entry.name)
+            elif entry.is_file(follow_symlinks=False):
+                files.setdefault(entry.name.upper(), folder / entry.name)
+    except (OSError, ValueError) as error:
+        raise FolderFault(f"{folder} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    return DiskFolder(folder, files, inner), len(entries)
 
 
 def _system(found: DiskFolder) -> DiskFolder | None:
     return found if any(name in found.files for name in _SYSTEM_FILES) else None
 
 
-def _search(folder: Path, above: DiskFolder | None, found: list[RackPlace], seen: list[int], depth: int) -> None:
-    here = _contents(folder, seen)
-    if any(name in here.files for name in _RACK_FILES):
-        found.append(RackPlace(here, above))
-    if depth < _DEEPEST:
-        for inner in _folders(folder):
-            _search(inner, _system(here), found, seen, depth + 1)
+@dataclass
+class _Search:
+    found: list[RackPlace] = field(default_factory=list)
+    _entries: int = 0
+
+    def walk(self, folder: Path, above: DiskFolder | None, depth: int = 0) -> None:
+        """Find the racks in a folder and below it; one below it that cannot be read holds none."""
+        try:
+            here, entries = _contents(folder)
+        except FolderFault:
+            if depth:
+                return
+            raise
+        self._entries += entries
+        if self._entries > _MOST_ENTRIES:
+            message = f"{folder} and the folders in it hold more than {_MOST_ENTRIES} files"
+            raise FolderFault(message, "name a folder of it")
+        if any(name in here.files for name in _RACK_FILES):
+            self.found.append(RackPlace(here, above))
+        for inner in here.folders if depth < _DEEPEST else ():
+            self.walk(inner, _system(here), depth + 1)

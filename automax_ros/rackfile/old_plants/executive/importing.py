@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 from automax_ros.core.diagnostics import Diagnostic
 from automax_ros.core.text import count_of, printable, quoted
-from automax_ros.core.user_error import UserError
 from automax_ros.rackfile.model.config import MAX_SLOT
 from automax_ros.rackfile.modules.processor import PROCESSOR
 from automax_ros.rackfile.modules.registry import SUPPORTED
@@ -27,11 +26,14 @@ from automax_ros.rackfile.old_plants.executive.disks import OldRack, read_old_ra
 from automax_ros.rackfile.old_plants.executive.document import Document, ModuleEntry
 from automax_ros.rackfile.old_plants.executive.fields import FieldChoice, Record
 from automax_ros.rackfile.old_plants.executive.findings import Findings, Unplaced
-from automax_ros.rackfile.old_plants.executive.folders import RackPlace
+from automax_ros.rackfile.old_plants.executive.folders import DiskFolder, RackPlace
+from automax_ros.rackfile.old_plants.executive.ladder import ladder_files, stub_file
 from automax_ros.rackfile.old_plants.executive.parts import (
     NETWORK,
     PROCESSORS,
     OldModule,
+    OldTask,
+    by_slot,
     is_memory,
     modules_of,
     tasks_of,
@@ -41,7 +43,6 @@ from automax_ros.rackfile.old_plants.executive.tasks import TaskEntries, file_of
 from automax_ros.rackfile.old_plants.executive.variables import variables_of
 from automax_ros.rackfile.old_plants.net_files import net_lines
 from automax_ros.rackfile.reading.executive import NEWEST, version_text
-from automax_ros.rackfile.reading.files import MAX_BYTES
 
 _OLDER = 32
 """The newest Executive whose databases have SYSTEM_VER 0."""
@@ -66,7 +67,7 @@ class Choices:
 
 @dataclass
 class ImportedRack:
-    """A new rack: the text of its file, the sources of its tasks by file name, counts, and errors that stay.
+    """A new rack: the text of its file, the sources of its tasks by file name, counts, and what its reader says of it.
 
     ``known`` are the part codes whose modules were found out or given.
     """
@@ -76,7 +77,7 @@ class ImportedRack:
     sources: dict[str, bytes]
     tasks: int
     commons: int
-    errors: list[Diagnostic]
+    diagnostics: list[Diagnostic]
     known: dict[int, str]
 
 
@@ -84,7 +85,7 @@ def import_rack(place: RackPlace, choices: Choices, findings: Findings) -> Impor
     """Return the rack file of a rack of the Executive; everything that is damaged, guessed or left out is told.
 
     Raises:
-        UserError: the rack file would have more text than one may have.
+        UserError: the rack file would be larger than one may be.
     """
     return _Import(read_old_rack(place, choices.fields, choices.code_page, findings), choices, findings).result()
 
@@ -94,9 +95,10 @@ class _Import:
         self._old, self._choices, self._findings = old, choices, findings
         self._code_page = choices.code_page or DEFAULT_CODE_PAGE
         self._unplaced = Unplaced()
-        self._net_lines = net_lines(old.place.rack.path)
-        if old.place.system is not None:
-            self._net_lines = {**net_lines(old.place.system.path), **self._net_lines}
+        self._net_lines: dict[str, str] = {}
+        for folder in (old.place.system, old.place.rack):
+            if folder is not None:
+                self._net_lines |= self._lines_of_networks(folder)
         self._tasks = tasks_of(old.of("TASKS"), findings)
         self._task_entries = TaskEntries(old.place.rack, self._tasks, self._code_page, choices.drives, findings)
         self._sources = self._task_entries.sources
@@ -106,30 +108,35 @@ class _Import:
         written = frozenset(name for source in self._sources.values() for name in source.written)
         given = (choices.parts, choices.modules)
         self._modules = modules_of(own, self._tasks, self._variables, written, given, findings)
+        self._udcs = frozenset(slot for slot, module in self._modules.items() if module.model in UDC.models)
         self._declared = [item.text for item in self._variables if item.declared is not None]
+
+    def _lines_of_networks(self, folder: DiskFolder) -> dict[str, str]:
+        found = net_lines(folder.path)
+        for name, reason in found.left_out:
+            self._findings.add("AMX6795", f"the file {reason}: not read", name)
+        return found.lines
 
     def result(self) -> ImportedRack:
         document = Document(self._head())
-        document.modules = [self._module(module) for module in self._modules.values()]
+        tasks = by_slot(self._tasks)
+        document.modules = [self._module(module, tasks.get(module.slot, ())) for module in self._modules.values()]
         document.elsewhere = list(self._elsewhere())
         document.commons = CommonEntries(self._modules, self._net_lines, self._unplaced).entries(self._variables)
         self._tell_choices()
         self._unplaced.tell(self._findings)
-        errors = document.settle(self._findings)
+        diagnostics = document.settle(self._findings)
         running = [task for module in document.modules for task in module.tasks if not task.is_comment]
         files = {file_of(task): None for task in running}
         sources = {file: data for file, data in self._task_entries.files.items() if file in files}
         document.tail = list(self._tail(sources))
-        text = document.text()
-        if len(text.encode()) > MAX_BYTES:
-            raise UserError(f"the rack file would have more than {MAX_BYTES} bytes", "is this one rack?")
         commons = sum(not entry.is_comment for entry in document.commons)
         known = {
             module.code: module.model
             for module in self._modules.values()
             if module.code is not None and module.model is not None
         }
-        return ImportedRack(self._name, text, sources, len(running), commons, errors, known)
+        return ImportedRack(self._name, document.text(), sources, len(running), commons, diagnostics, known)
 
     # Head
 
@@ -167,10 +174,9 @@ class _Import:
 
     # Modules
 
-    def _module(self, module: OldModule) -> ModuleEntry:
+    def _module(self, module: OldModule, tasks: Sequence[OldTask]) -> ModuleEntry:
         card = module.card
         file, record = (card.file, card.number) if card is not None else ("$TASKS.DBF", 0)
-        tasks = [task for task in self._tasks if task.slot == module.slot]
         if card is None and tasks:
             record = tasks[0].record.number
         desc = card.text("desc") if card is not None else "no record of $CARD"
@@ -210,11 +216,6 @@ class _Import:
                 yield comment_of(f"{record.place}: {values_of(record)}")
                 reason = "parameters of a UDC's drives have no place in a rack file"
                 self._unplaced.add(record.file, reason, record.number)
-
-    @property
-    def _udcs(self) -> set[int]:
-        """The slots with a UDC."""
-        return {slot for slot, module in self._modules.items() if module.model in UDC.models}
 
     def _elsewhere(self) -> Iterator[str]:
         """Yield remote racks, modules in them, and tasks and parameters of slots that have no module."""
@@ -260,10 +261,12 @@ class _Import:
                 self._findings.add("AMX6794", f"--drive {quoted(name)}: {what}", "$TASKS.DBF")
 
     def _tail(self, sources: Mapping[str, bytes]) -> Iterator[str]:
-        stubs = [file for file in sources if file not in self._old.place.rack.files]
-        used = {*sources, *(source.file for source in self._sources.values())}
-        used.update(task.file for task in self._tasks if task.kind != "PC")
-        used.update(f"{file.removesuffix('.BAS')}{suffix}" for file in stubs for suffix in (".PC", ".XRF"))
+        used: set[str] = set()
+        for task in self._tasks:
+            if task.kind != "PC":
+                used.add(task.file)
+            elif stub_file(task.name) in sources:
+                used.update(ladder_files(task.name))
         left = files_not_read(self._old.place.rack, used)
         if left:
             yield "Files of the old rack that were not used:"

@@ -10,17 +10,29 @@ import re
 from collections.abc import Iterable, Sequence
 
 from automax_ros.core.types import bare_name
+from automax_ros.language.tree.task_kind import LADDER_SUFFIX
 
 _WORD = re.compile(rb"[A-Z_][A-Z0-9_]{0,15}", re.IGNORECASE)
 _PER_LINE = 4
 _STEP = 10
-_MOST = 2000
+MOST_DECLARED = 2000
+"""Most variables that a stub declares (decision: a bound on untrusted files)."""
+
+
+def stub_file(name: str) -> str:
+    """Return the name of the file of a ladder task's stub."""
+    return f"{name}.BAS"
+
+
+def ladder_files(name: str) -> tuple[str, str]:
+    """Return the names of the files of a ladder task that are searched for names: the task, its cross reference."""
+    return f"{name}{LADDER_SUFFIX}", f"{name}.XRF"
 
 
 def named_in(data: Iterable[bytes], declared: Sequence[str]) -> list[str]:
     """Return the variables, as COMMON declares them, whose names occur in the bytes of files."""
     words = {match.decode("ascii").upper() for part in data for match in _WORD.findall(part)}
-    return [item for item in declared if bare_name(item.partition("(")[0].partition(":")[0]) in words][:_MOST]
+    return [item for item in declared if bare_name(item.partition("(")[0].partition(":")[0]) in words]
 
 
 def stub_of(name: str, files: Sequence[str], declared: Sequence[str]) -> str:

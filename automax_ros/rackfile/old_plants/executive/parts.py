@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from automax_ros.rackfile.model.config import MAX_SLOT
 from automax_ros.rackfile.model.module import MAX_PRIORITY, MIN_PRIORITY
 from automax_ros.rackfile.modules.common_memory import COMMON_MEMORY
 from automax_ros.rackfile.modules.io import DIGITAL_IO
@@ -27,6 +28,10 @@ PROCESSOR, MEMORY, NETWORK, UDC = "57C435", "57C413", "57C404", "57552"
 """What a module of these kinds is taken for where its number is not known."""
 PROCESSORS = (*PROCESSOR_KIND.models, *PC3000.models)
 """All modules that are Processors."""
+COMPILED = ("BLK", "BAS")
+"""Kinds of tasks that are compiled."""
+RUNNING = (*COMPILED, "PC")
+"""Kinds of tasks that run; their names differ."""
 PROCESSOR_SLOTS = range(5)
 """Slots where a Processor can be (J2-3106-1 p. F-4)."""
 _NUMBER = re.compile(r"(?:B/M\s*)?\b(57C?-?[0-9]{3}[A-Z]?)\b", re.IGNORECASE)
@@ -42,12 +47,18 @@ class OldModule:
     card: Record | None
     model: str | None
     why: str = ""
-    candidates: tuple[str, ...] = ()
 
     @property
     def code(self) -> int | None:
         """Its part code."""
         return None if self.card is None else self.card.whole("part")
+
+    @property
+    def options(self) -> str:
+        """The options that say which module it is, "" if none can."""
+        ways = [] if self.code is None else [f"--part {self.code}=NUMBER"]
+        ways += [f"--module {self.slot}=NUMBER"] if 0 <= self.slot <= MAX_SLOT else []
+        return ", or ".join(ways)
 
 
 @dataclass(frozen=True)
@@ -112,37 +123,43 @@ def modules_of(
             continue
         code = f"part code {module.code}" if module.code is not None else "a module without a part code"
         if module.model is not None:
-            message, hint = f"slot {module.slot}: {code} is taken for a {module.model}: {module.why}", None
+            message = f"slot {module.slot}: {code} is taken for a {module.model}: {module.why}"
+            hint = f"if it is another: {module.options}"
         else:
             what = code if module.code is not None else "it"
             message = f"slot {module.slot}: which module {what} is, is not known; {module.why}"
-            example = module.candidates[0] if module.candidates else "NUMBER"
-            options = [f"--part {module.code}={example}"] if module.code is not None else []
-            hint = f"read it on the module: {', or '.join([*options, f'--module {module.slot}={example}'])}"
-        findings.add("AMX6794", message, module.card.file, module.card.number, hint)
+            hint = f"read its number on the module: {module.options}"
+        findings.add("AMX6794", message, module.card.file, module.card.number, hint if module.options else None)
     return modules
 
 
-@dataclass
 class _Finding:
-    cards: Sequence[Record]
-    tasks: Sequence[OldTask]
-    variables: Sequence[OldVariable]
-    written: frozenset[str]
-    parts: Mapping[int, str]
-    slots: Mapping[int, str]
+    def __init__(
+        self,
+        cards: Sequence[Record],
+        tasks: Sequence[OldTask],
+        variables: Sequence[OldVariable],
+        written: frozenset[str],
+        parts: Mapping[int, str],
+        slots: Mapping[int, str],
+    ) -> None:
+        self._cards, self._written, self._parts, self._slots = cards, written, parts, slots
+        self._tasks = by_slot(tasks)
+        self._points: defaultdict[int | None, list[OldVariable]] = defaultdict(list)
+        for variable in variables:
+            if _is_point(variable) and not variable.place.drop:
+                self._points[variable.place.slot].append(variable)
 
     def modules(self) -> dict[int, OldModule]:
         found = {slot: self._alone(slot, card) for slot, card in self._placed()}
-        by_code: dict[int, set[str]] = defaultdict(set)
+        by_code: dict[int | None, dict[str, int]] = defaultdict(dict)
         for module in found.values():
-            if module.model is not None and module.code is not None and module.slot not in self.slots:
-                by_code[module.code].add(module.model)
+            if module.model is not None and module.code is not None and module.slot not in self._slots:
+                by_code[module.code].setdefault(module.model, module.slot)
         for slot, module in found.items():
-            models = by_code.get(module.code, set()) if module.code is not None else set()
+            models = by_code.get(module.code, {})
             if module.model is None and len(models) == 1:
-                model = next(iter(models))
-                other = next(item.slot for item in found.values() if item.model == model and item.code == module.code)
+                model, other = next(iter(models.items()))
                 found[slot] = OldModule(slot, module.card, model, f"as in slot {other}, which has the same code")
             elif module.model is not None and module.why and len(models) > 1:
                 both = " and ".join(sorted(models))
@@ -151,12 +168,12 @@ class _Finding:
 
     def _placed(self) -> Iterator[tuple[int, Record | None]]:
         taken: set[int] = set()
-        for card in self.cards:
+        for card in self._cards:
             slot = card.whole("slot")
             if slot is not None and slot not in taken:
                 taken.add(slot)
                 yield slot, card
-        for slot in (*self.slots, *(task.slot for task in self.tasks)):
+        for slot in (*self._slots, *self._tasks):
             if slot is not None and slot not in taken:
                 taken.add(slot)
                 yield slot, None
@@ -164,10 +181,10 @@ class _Finding:
     def _alone(self, slot: int, card: Record | None) -> OldModule:
         """Return a module by what is known of its own slot and code."""
         code = card.whole("part") if card is not None else None
-        if slot in self.slots:
-            return OldModule(slot, card, self.slots[slot])
-        if code is not None and code in self.parts:
-            return OldModule(slot, card, self.parts[code])
+        if slot in self._slots:
+            return OldModule(slot, card, self._slots[slot])
+        if code is not None and code in self._parts:
+            return OldModule(slot, card, self._parts[code])
         if card is not None:
             numbers = {module_number(text.replace("-", "")) for text in _NUMBER.findall(card.text("desc"))}
             known = sorted(filter(number_known, numbers))
@@ -176,7 +193,7 @@ class _Finding:
         return self._by_use(slot, card)
 
     def _by_use(self, slot: int, card: Record | None) -> OldModule:
-        own = [task for task in self.tasks if task.slot == slot and task.kind != "INC"]
+        own = [task for task in self._tasks.get(slot, ()) if task.kind != "INC"]
         runs = next((task.name for task in own if task.on_processor), None)
         if runs is not None:
             return OldModule(slot, card, PROCESSOR, f"task {runs} runs there; which Processor it is, is not known")
@@ -185,13 +202,11 @@ class _Finding:
             return OldModule(slot, card, UDC, f"no Processor has the slot and the priority of task {drives}")
         if card is not None and card.text("network"):
             return OldModule(slot, card, NETWORK, f"it is on network {card.text('network')}")
-        points = [
-            item for item in self.variables if item.place.slot == slot and not item.place.drop and _is_point(item)
-        ]
+        points = self._points.get(slot, [])
         registers = {item.place.register for item in points if item.place.register is not None}
         if registers & {ISCR, SCANS_PER_INTERRUPT}:
             return OldModule(slot, card, UDC, f"register {min(registers & {ISCR, SCANS_PER_INTERRUPT})} is used")
-        fitting = tuple(_fitting(points, self.written)) if registers else ()
+        fitting = tuple(_fitting(points, self._written)) if registers else ()
         if len(fitting) == 1:
             return OldModule(slot, card, fitting[0], f"no other has register {max(registers)} as it is used")
         if not fitting and registers and registers <= APPLICATION:
@@ -199,7 +214,7 @@ class _Finding:
         why = f"by its registers it can be {', '.join(fitting) or 'none that the emulator has'}"
         if not registers:
             why = "no task, network or variable of its slot says it"
-        return OldModule(slot, card, None, why, fitting)
+        return OldModule(slot, card, None, why)
 
     def _with_memory(self, found: dict[int, OldModule]) -> dict[int, OldModule]:
         """Return the modules with common memory in slot 0, where Processors elsewhere need it."""
@@ -231,14 +246,30 @@ def _fitting(points: Sequence[OldVariable], written: frozenset[str]) -> Iterator
                 yield number
 
 
+def by_slot(tasks: Iterable[OldTask]) -> Mapping[int | None, Sequence[OldTask]]:
+    """Return the tasks of each slot, in their order."""
+    found: defaultdict[int | None, list[OldTask]] = defaultdict(list)
+    for task in tasks:
+        found[task.slot].append(task)
+    return found
+
+
 def tasks_of(records: Iterable[Record], findings: Findings) -> list[OldTask]:
-    """Return the tasks of $TASKS in their order; one whose name occurs before is told and left out (AMX6789)."""
-    found: dict[str, OldTask] = {}
+    """Return the tasks of $TASKS in their order; one whose name occurs before is told and left out (AMX6789).
+
+    What does not run, such as an include file, may have the name of a task.
+    """
+    found: dict[tuple[str, str], OldTask] = {}
     for record in records:
-        name, kind = record.text("name").upper(), record.text("type").upper()
-        if name in found:
-            message = f"task {name} is defined before, by record {found[name].record.number}: this one is left out"
+        task = OldTask(
+            record,
+            record.text("name").upper(),
+            record.text("type").upper(),
+            record.whole("slot"),
+            record.whole("priority"),
+        )
+        first = found.setdefault((task.name, "" if task.kind in RUNNING else task.kind), task)
+        if first is not task:
+            message = f"task {task.name} is defined before, by record {first.record.number}: this one is left out"
             findings.add("AMX6789", message, record.file, record.number)
-            continue
-        found[name] = OldTask(record, name, kind, record.whole("slot"), record.whole("priority"))
     return list(found.values())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
@@ -21,7 +20,7 @@ from automax_ros.language.tree.walk import statements_in_order
 from automax_ros.rackfile.old_plants.draft import is_udc_task
 from automax_ros.rackfile.old_plants.executive.findings import Findings
 from automax_ros.rackfile.old_plants.executive.folders import DiskFolder
-from automax_ros.rackfile.old_plants.includes import INCLUDE_SUFFIX
+from automax_ros.rackfile.old_plants.includes import INCLUDE_SUFFIX, include_reader
 from automax_ros.rackfile.old_plants.sources import Converted, convert
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 
@@ -70,7 +69,7 @@ def declarations_of(sources: Iterable[TaskSource]) -> Declarations:
 def read_source(
     folder: DiskFolder, name: str, kind: str, on_udc: bool, code_page: str, findings: Findings
 ) -> TaskSource:
-    """Return a task's source of a kind BLK or BAS; bytes beyond ASCII are read by ``code_page`` unless they are UTF-8.
+    """Return a task's source of a kind BLK or BAS; what is not Unicode is read by ``code_page``.
 
     Raises:
         FileFault: it is not there, cannot be read, is empty, or is not text.
@@ -79,16 +78,16 @@ def read_source(
     path = folder.files.get(file)
     if path is None:
         raise FileFault("is not in the folder")
-    data = read_bytes(path)
-    if not _is_utf_8(data):
-        data = data.decode(code_page, errors="replace").encode()
     target, tick = (Platform.UDC, UDC_TICK_NS) if on_udc else (Platform.AUTOMAX, DEFAULT_TICK_NS)
 
     def result_of(text: str) -> CheckResult:
         return check(SourceText(file, text), name=name, catalogue=CATALOGUE, target=target, tick_ns=tick)
 
     converted = convert(
-        data, lambda text: result_of(text).diagnostics, lambda include: _include(folder, include, code_page)
+        read_bytes(path),
+        lambda text: result_of(text).diagnostics,
+        include_reader(folder.files, code_page),
+        code_page,
     )
     if not converted.before.strip(" \n\t\0"):
         raise FileFault("is empty")
@@ -106,25 +105,6 @@ def read_source(
     program = result_of(converted.after).program
     written = frozenset(places_that_write(program)) if program is not None else frozenset()
     return TaskSource(name, file, converted, tuple(declared), written, is_udc_task(module))
-
-
-def _is_utf_8(data: bytes) -> bool:
-    try:
-        data.decode()
-    except UnicodeDecodeError:
-        return False
-    return True
-
-
-def _include(folder: DiskFolder, name: str, code_page: str) -> str | None:
-    path: Path | None = folder.files.get(name)
-    if path is None:
-        return None
-    try:
-        data = read_bytes(path)
-    except FileFault:
-        return None
-    return data.decode() if _is_utf_8(data) else data.decode(code_page, errors="replace")
 
 
 _IS_SOURCE = (*TASK_SUFFIXES, INCLUDE_SUFFIX)

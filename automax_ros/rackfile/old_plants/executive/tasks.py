@@ -11,13 +11,12 @@ from automax_ros.rackfile.old_plants.executive.cards import comment_of
 from automax_ros.rackfile.old_plants.executive.document import Entry
 from automax_ros.rackfile.old_plants.executive.findings import Findings
 from automax_ros.rackfile.old_plants.executive.folders import DiskFolder
-from automax_ros.rackfile.old_plants.executive.ladder import named_in, stub_of
-from automax_ros.rackfile.old_plants.executive.parts import OldModule, OldTask
+from automax_ros.rackfile.old_plants.executive.ladder import MOST_DECLARED, ladder_files, named_in, stub_file, stub_of
+from automax_ros.rackfile.old_plants.executive.parts import COMPILED, RUNNING, OldModule, OldTask
 from automax_ros.rackfile.old_plants.executive.sources import TaskSource, read_source
 from automax_ros.rackfile.reading.files import FileFault, read_bytes
 from automax_ros.rackfile.reading.names import DeclarationFault, check_task_name
 
-_COMPILED = ("BLK", "BAS")
 _NOT_LOADED = "a test task, which is not loaded with the others"
 _INCLUDED = "an include file: it is written into the tasks that include it"
 
@@ -40,7 +39,7 @@ class TaskEntries:
 
     def __post_init__(self) -> None:
         for task in self.tasks:
-            if task.kind in _COMPILED and task.name:
+            if task.kind in COMPILED and task.name:
                 try:
                     source = read_source(
                         self.folder, task.name, task.kind, task.is_udc, self.code_page, self.findings
@@ -64,7 +63,7 @@ class TaskEntries:
         if module.model in UDC.models and not reason:
             place = f"drive: {self._drive(task)}"
         if task.kind == "PC" and not reason:
-            file = f"{task.name}.BAS"
+            file = stub_file(task.name)
             note = f"a stub of {task.name}.PC" + (f": {note}" if note else "")
             self._ladder(task, file, declared)
         name = "" if file == f"{task.name}.BLK" else f"file: {file}, "
@@ -85,7 +84,7 @@ class TaskEntries:
             return fault.message
         if task.kind == "INC":
             return _INCLUDED if task.file in self.folder.files else f"{task.file} is not in the folder"
-        if task.kind not in (*_COMPILED, "PC"):
+        if task.kind not in RUNNING:
             return f"type {quoted(task.kind)} is none that $TASKS has"
         if task.record.flag("utility"):
             return _NOT_LOADED
@@ -108,7 +107,7 @@ class TaskEntries:
 
     def _ladder(self, task: OldTask, file: str, declared: Sequence[str]) -> None:
         """Make the stub of a ladder task."""
-        named = [f"{task.name}{suffix}" for suffix in (".PC", ".XRF")]
+        named = ladder_files(task.name)
         data: dict[str, bytes] = {}
         for name in named:
             path = self.folder.files.get(name)
@@ -118,10 +117,11 @@ class TaskEntries:
                 except FileFault as fault:
                     self.findings.add("AMX6795", f"the file {fault}", name)
         found = named_in(data.values(), declared)
-        self.files[file] = stub_of(task.name, list(data), found).encode()
+        self.files[file] = stub_of(task.name, list(data), found[:MOST_DECLARED]).encode()
         message = f"the ladder task {task.name} becomes a stub in BASIC, {file}, that does nothing"
         if data:
             message += f"; {' and '.join(data)} name {count_of(len(found), 'variable')}"
+            message += f", of which only the first {MOST_DECLARED} are declared" if len(found) > MOST_DECLARED else ""
         code = "AMX6795" if named[0] in data else "AMX6789"
         message += "" if named[0] in data else f"; {named[0]} is not in the folder, or cannot be read"
         self.findings.add(code, message, task.record.file, task.record.number, "write its logic there")

@@ -6,6 +6,7 @@ declare decides, otherwise 16 and 8 are taken, by the row of powers (decision). 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -103,9 +104,13 @@ class _Reading:
 
     def codes(self, records: Sequence[Record]) -> dict[int, DataType]:
         """Return the types of all codes that occur, and tell those that had to be found out."""
+        by_code: defaultdict[int, list[Record]] = defaultdict(list)
+        for record in records:
+            code = record.whole("type")
+            if code is not None:
+                by_code[code].append(record)
         found: dict[int, DataType] = {}
-        for code in sorted({code for item in records if (code := item.whole("type")) is not None}):
-            own = [item for item in records if item.whole("type") == code]
+        for code, own in sorted(by_code.items()):
             if code in _CODES:
                 found[code] = _CODES[code]
                 continue

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from automax_ros.rackfile.old_plants.executive import dbase
 from automax_ros.rackfile.old_plants.executive.dbase import MAX_TABLE_BYTES, DbaseFault, read_dbase
 from automax_ros.rackfile.old_plants.executive.findings import Findings
 from rackfile.old_plants.executive.disks import GONE, WIND1, table
@@ -211,3 +212,22 @@ def test_a_file_that_is_cut_anywhere_loses_no_record_silently(cut):
     assert names(found) == ALL[: min(whole, 9)]
     if whole < 9:
         assert "AMX6789" in {code for code, _ in told}
+
+
+def test_very_many_records_with_another_flag_are_told_at_once(monkeypatch):
+    """As many pairs of records as would take hours are not compared."""
+    count = 1_000_000
+    monkeypatch.setattr(dbase, "MAX_RECORDS", count)
+    data = bytearray(table([("N", "N", 1)], [{}]))
+    data[4:8] = count.to_bytes(4, "little")
+    found, told = read(data[:65] + b"\7 " * count + b"\x1a")
+    assert len(found.rows) == count
+    message = "records 1, 2, 3, 4, 5 and 999995 more: the flag in front is 07h, neither a blank nor `*`: kept"
+    assert told == [("AMX6790", message)]
+
+
+@pytest.mark.parametrize(("most", "rows", "told_of"), [(9, 9, []), (8, 8, ["AMX6789"])])
+def test_as_many_records_as_are_read_are_not_too_many(monkeypatch, most, rows, told_of):
+    monkeypatch.setattr(dbase, "MAX_RECORDS", most)
+    found, told = read(WHOLE)
+    assert (len(found.rows), [code for code, _ in told]) == (rows, told_of)

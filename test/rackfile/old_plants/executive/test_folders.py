@@ -80,3 +80,25 @@ def test_links_are_not_followed_and_very_many_files_are_refused(tmp_path, monkey
     monkeypatch.setattr(folders, "_MOST_ENTRIES", 2)
     with pytest.raises(FolderFault, match="hold more than 2 files"):
         racks_in(tmp_path / "real")
+
+
+def test_a_folder_above_that_cannot_be_read_is_no_fault_of_the_rack(library, monkeypatch):
+    """The disk's folder is given, not the one above it."""
+
+    def listing(folder):
+        if folder == library / "MILL":
+            raise PermissionError(13, "Permission denied")
+        return real(folder)
+
+    real = folders.os.scandir
+    monkeypatch.setattr(folders.os, "scandir", listing)
+    place = chosen_rack(library / "MILL" / "WIND1", None)
+    assert (place.title, place.system) == ("WIND1", None)
+
+
+def test_each_folder_is_listed_once(library, monkeypatch):
+    listed = []
+    real = folders.os.scandir
+    monkeypatch.setattr(folders.os, "scandir", lambda folder: listed.append(folder) or real(folder))
+    racks_in(library)
+    assert len(listed) == len(set(listed)) == 7

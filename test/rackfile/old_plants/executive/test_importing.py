@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.problems import Severity
 from automax_ros.core.user_error import UserError
 from automax_ros.rackfile.checks.tasks import check_tasks
 from automax_ros.rackfile.loader import load, load_stored
@@ -18,6 +19,7 @@ from automax_ros.rackfile.old_plants.executive.fields import field_choice
 from automax_ros.rackfile.old_plants.executive.findings import Findings
 from automax_ros.rackfile.old_plants.executive.folders import chosen_rack
 from automax_ros.rackfile.old_plants.executive.importing import Choices, import_rack
+from automax_ros.rackfile.old_plants.executive.ladder import MOST_DECLARED
 from rackfile.old_plants.executive.disks import (
     CARD,
     GONE,
@@ -84,6 +86,10 @@ def imported(folder, **choices):
     return made, [(item.code, item.place, item.message) for item in findings.items]
 
 
+def errors_of(made):
+    return [item for item in made.diagnostics if item.severity is Severity.ERROR]
+
+
 def config_of(text):
     result = load_stored(SourceText("rack.yaml", text), WIND1 / "rack.yaml")
     assert result.config is not None, result.diagnostics
@@ -107,7 +113,7 @@ def shape(config):
 def test_the_sample_becomes_what_a_person_makes_of_it():
     made, told = imported(SAMPLE, parts=PARTS, executive=33)
     assert shape(config_of(made.text)) == shape(config_of(EXPECTED))
-    assert (made.tasks, made.commons, made.errors) == (3, 12, [])
+    assert (made.tasks, made.commons, errors_of(made)) == (3, 12, [])
     assert sorted(made.sources) == ["LINE.BLK", "SECT1.BLK", "WIND_A.BLK"]
     for name, data in made.sources.items():
         assert data == (WIND1 / name).read_bytes().replace(b"\r\n", b"\n").removesuffix(b"\x1a")
@@ -258,7 +264,7 @@ def test_a_point_that_its_module_does_not_have_becomes_a_plain_common(plant):
     points = {item.name: item.point for item in config_of(made.text).declared}
     assert points == {"REF%": None, "A%": None, "B@": IoPoint(5, 0, 3), "C@": None}
     assert ("AMX6795", "$SWVAR.DBF record 2", "A% becomes a plain common of the rack file: register of I/O point A% is 9; it must be 0 to 3") in told  # fmt: skip # noqa: E501
-    assert made.errors == []
+    assert errors_of(made) == []
 
 
 def test_types_are_those_that_tasks_declare_and_else_a_guess_that_is_told(plant):
@@ -436,8 +442,8 @@ def test_a_damaged_library_is_imported_or_refused_by_the_typed_error(tmp_path_fa
     except UserError:
         return
     result = load_stored(SourceText("rack.yaml", made.text), folder / "rack.yaml")
-    assert (result.config is None) == bool(made.errors)
-    assert {item.code for item in made.errors} <= {"AMX6205", "AMX6206", "AMX6207", "AMX6209", "AMX6302", "AMX6409"}
+    assert (result.config is None) == bool(errors_of(made))
+    assert {item.code for item in errors_of(made)} <= {"AMX6205", "AMX6206", "AMX6207", "AMX6209", "AMX6302", "AMX6409"}
 
 
 NAMES = st.text(alphabet="ABX_19 %@$()", min_size=0, max_size=6)
@@ -468,4 +474,63 @@ def test_whatever_the_records_say_only_errors_of_processors_stay(tmp_path_factor
     for name, fields, rows in (("CARD", CARD, cards), ("TASKS", TASKS, tasks), ("SWVAR", SWVAR, variables)):
         (folder / f"${name}.DBF").write_bytes(table(fields, rows))
     made, _ = imported(folder, parts=PARTS)
-    assert {item.code for item in made.errors} <= {"AMX6205", "AMX6206", "AMX6207", "AMX6209"}, made.text
+    assert {item.code for item in errors_of(made)} <= {"AMX6205", "AMX6206", "AMX6207", "AMX6209"}, made.text
+
+
+def test_a_description_that_is_too_long_is_cut_and_told(tmp_path):
+    fields = [(name, kind, 254 if name == "DESC" else length) for name, kind, length in SWVAR]
+    folder = rack(tmp_path / "PM1", [card(0, 1), processor()], [task("LINE")], [], {"LINE.BLK": READS_REF})
+    (folder / "$SWVAR.DBF").write_bytes(table(fields, [memory("REF", DESC="X" * 254), memory("B", DESC="Y" * 200)]))
+    made, told = imported(folder)
+    texts = {item.name: item.description for item in config_of(made.text).declared}
+    assert texts == {"REF%": "X" * 197 + "...", "B%": "Y" * 200}
+    message = "record 1: the end of the description, which has more than 200 characters, is left out"
+    assert [item for item in told if "description" in item[2]] == [("AMX6795", "$SWVAR.DBF record 1", message)]
+
+
+@pytest.mark.parametrize("kind", ["INC", "?"])
+def test_an_include_file_of_a_tasks_name_does_not_hide_the_task(plant, kind):
+    folder = plant(tasks=[task("T1", kind=kind), task("T1", priority=6), task("T1", kind=kind)],
+                   files={"T1.BLK": READS_REF, "T1.INC": "!\n"})  # fmt: skip
+    made, told = imported(folder)
+    assert [task.name for _, task in config_of(made.text).placed_tasks] == ["LINE", "T1"]
+    assert ("AMX6789", "$TASKS.DBF record 4", "task T1 is defined before, by record 2: this one is left out") in told
+
+
+def test_a_source_with_the_name_of_a_stub_is_told_as_not_used(plant):
+    files = {"LAD.PC": b"\0REF\0", "LAD.XRF": "REF\n", "LAD.BAS": "10 END\n"}
+    made, _ = imported(plant(tasks=[task("LAD", kind="PC", priority=6)], files=files))
+    assert b"STUB OF THE LADDER TASK LAD.PC" in made.sources["LAD.BAS"]
+    tail = made.text.partition("# Files of the old rack that were not used:\n")[2].splitlines()
+    assert tail == ["#   LAD.BAS: a source that no record of $TASKS names"]
+
+
+def test_a_stub_that_declares_only_the_first_of_very_many_variables_says_so(plant):
+    names = [f"V{number}" for number in range(MOST_DECLARED + 1)]
+    folder = plant(tasks=[task("LAD", kind="PC", priority=6)], variables=[memory(name) for name in names],
+                   files={"LAD.PC": " ".join(names)})  # fmt: skip
+    made, told = imported(folder)
+    stub = made.sources["LAD.BAS"].decode()
+    assert (stub.count("%"), f"V{MOST_DECLARED - 1}%" in stub) == (MOST_DECLARED, True)
+    message = "LAD.PC name 2001 variables, of which only the first 2000 are declared"
+    assert [message in text for _, place, text in told if place == "$TASKS.DBF record 2"] == [True]
+
+
+def test_sources_and_include_files_in_utf_16_are_read(plant):
+    line = "10 COMMON REF% ! GR\u00dcN\n15 INCLUDE HEAD\n20 CALL SCAN_LOOP(TICKS=4)\n30 X% = REF%\n40 END\n"
+    files = {"HEAD.INC": "LOCAL X% ! \u00dc\n".encode("utf-8-sig"), "B.INC": "LOCAL Y%\n".encode("utf-16")}
+    made, told = imported(plant(line=line.replace("15 INC", "12 INCLUDE B\n15 INC").encode("utf-16"), files=files))
+    assert made.sources["LINE.BLK"].decode().splitlines()[:5] == [
+        "10 COMMON REF% ! GR\u00dcN", "12 ! INCLUDE B.INC", "13 LOCAL Y%", "15 ! INCLUDE HEAD.INC",
+        "16 LOCAL X% ! \u00dc",
+    ]  # fmt: skip
+    assert [item for item in told if item[0] == "AMX6789"] == []
+
+
+def test_links_of_net_files_out_of_the_folder_are_not_followed(plant, tmp_path):
+    folder = plant(variables=[point("THERE", 13, 0)])
+    (tmp_path / "SECRET").write_text("THERE% SECRET\n")
+    (folder / "A.NET").symlink_to(tmp_path / "SECRET")
+    made, told = imported(folder)
+    assert "SECRET" not in made.text
+    assert ("AMX6795", "A.NET", "the file is a link out of the folder: not read") in told

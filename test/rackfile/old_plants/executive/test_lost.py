@@ -235,14 +235,14 @@ def test_a_file_that_is_no_table_is_one_error(floppy, wind1):
 
 def test_hints_name_only_what_can_be_said(floppy, wind1):
     _, findings = imported(floppy, {}, fields=[field_choice("CARD.part=DESC")])
-    hints = [item.hint for item in findings.items if item.hint and item.hint.startswith("read it")]
-    assert hints[0] == "read it on the module: --module 6=57C402"
+    hints = [item.hint for item in findings.items if item.hint and item.hint.startswith("read its")]
+    assert hints[0] == "read its number on the module: --module 6=NUMBER"
     assert not any("None" in hint for hint in hints)
     (wind1 / "$TASKS.DBF").unlink()
     _, findings = imported(floppy, {})
     (found,) = [item for item in findings.items if item.message.startswith("slot 1: ")]
     assert found.message.endswith("is not known; no task, network or variable of its slot says it")
-    assert found.hint == "read it on the module: --part 2=NUMBER, or --module 1=NUMBER"
+    assert found.hint == "read its number on the module: --part 2=NUMBER, or --module 1=NUMBER"
 
 
 def test_choices_that_fit_nothing_are_told(floppy):
@@ -283,3 +283,15 @@ def test_a_point_that_its_module_does_not_have_loses_its_place_alone(tmp_path):
                   [memory("REF"), point("A", 5, 9)], {"LINE.BLK": SCAN.format("REF%")})  # fmt: skip
     made, findings = imported(folder)
     assert (made.commons, lost(findings)) == (2, [])
+
+
+def test_hints_of_guesses_and_of_slots_that_no_option_names(tmp_path):
+    folder = rack(tmp_path / "PM1", [card(0, 1), processor(), card(20, None)], [task("LINE")], [memory("REF")],
+                  {"LINE.BLK": SCAN.format("REF%")})  # fmt: skip
+    _, findings = imported(folder, {})
+    hints = {item.place: item.hint for item in findings.items if item.code == "AMX6794"}
+    assert hints == {
+        "$CARD.DBF record 1": "if it is another: --part 1=NUMBER, or --module 0=NUMBER",
+        "$CARD.DBF record 2": "if it is another: --part 2=NUMBER, or --module 1=NUMBER",
+        "$CARD.DBF record 3": None,
+    }
