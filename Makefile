@@ -8,10 +8,8 @@
 SHELL := /bin/bash
 BIN := .venv/bin
 CONFIG ?= config/dc_drive/rack.yaml
-# A file of tests is one worker's, in the order of test/conftest.py. One more than there are cores: live racks wait much.
-# More than four would only hold them up.
-WORKERS := $(shell cores=$$(getconf _NPROCESSORS_ONLN); echo $$((cores < 3 ? cores + 1 : 4)))
-PARALLEL := --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
+# A file of tests is one worker's, in the order of test/conftest.py; more than four would only hold up live racks.
+PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # What runs a second time in plain Python; the whole suite runs with the modules that were compiled ahead of time.
 PLAIN := test/drive/current_loop test/drive/base/test_state.py test/drive/plant/test_plant.py test/drive/base/test_motor.py test/runtime \
