@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from automax_ros.cli.options.values import option_number
+from automax_ros.cli.options.values import each_once, option_number
 from automax_ros.cli.output.screen import print_diagnostics
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.user_error import UsageError
@@ -50,16 +50,15 @@ def task_files(texts: Sequence[str]) -> dict[str, Path]:
     Raises:
         UsageError: a text is wrong, or two are for the same task.
     """
-    files: dict[str, Path] = {}
-    for text in texts:
-        name, equals, file = text.partition("=")
-        name = name.strip().upper()
-        if not (name and equals and file):
-            raise UsageError(f"--task {text[:80]!r} is not NAME=FILE", "for example --task SPEED=new/SPEED.BLK")
-        if name in files:
-            raise UsageError(f"--task {name} is given twice")
-        files[name] = Path(file)
-    return files
+    return each_once("--task", map(_task_file, texts))
+
+
+def _task_file(text: str) -> tuple[str, Path]:
+    name, equals, file = text.partition("=")
+    name = name.strip().upper()
+    if not (name and equals and file):
+        raise UsageError(f"--task {text[:80]!r} is not NAME=FILE", "for example --task SPEED=new/SPEED.BLK")
+    return name, Path(file)
 
 
 def task_sources(files: Mapping[str, Path]) -> dict[str, SourceText]:

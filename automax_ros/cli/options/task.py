@@ -10,7 +10,7 @@ from pathlib import Path
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declare.declaration import Platform
-from automax_ros.cli.options.values import naming
+from automax_ros.cli.options.values import each_once, naming
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.names import setting
 from automax_ros.core.text import quoted
@@ -186,13 +186,7 @@ def settings_of(program: Program, texts: Sequence[str]) -> dict[str, Value]:
     Raises:
         UsageError: a text is wrong, or two are for the same variable.
     """
-    values: dict[str, Value] = {}
-    for text in texts:
-        name, value = _setting(program, text)
-        if name in values:
-            raise UsageError(f"--set {name} is given twice", "give each variable one value")
-        values[name] = value
-    return values
+    return each_once("--set", (_setting(program, text) for text in texts))
 
 
 def _setting(program: Program, text: str) -> tuple[str, Value]:
