@@ -27,7 +27,8 @@ from automax_ros.recordings.mcap.mcap_file import TRUNCATED_HINT, McapFile, RawM
 from automax_ros.recordings.mcap.opening import NO_BAG_HINT, size_of
 from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT
 from automax_ros.recordings.read.common_log import variables_of
-from automax_ros.recordings.read.reader import BagReader, file_place
+from automax_ros.recordings.read.information import file_place
+from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.read.tally import Tally
 from automax_ros.recordings.tables.series import Progress

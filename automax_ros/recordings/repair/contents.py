@@ -20,7 +20,7 @@ from automax_ros.messages.cdr.message_headers import scan_head, write_head
 from automax_ros.messages.types.rack_files import RACK_FILE, RackFile, fingerprint
 from automax_ros.recordings.mcap.channels import is_known
 from automax_ros.recordings.mcap.metadata import FileSummary, TopicSummary
-from automax_ros.recordings.read.reader import custom_data_of, recorded_information
+from automax_ros.recordings.read.information import custom_data_of, recorded_information
 from automax_ros.recordings.read.tally import Tally
 
 _MAX_FILES = 200

@@ -19,7 +19,8 @@ from automax_ros.recordings.mcap.errors import BagError, RecordingError
 from automax_ros.recordings.mcap.mcap_file import McapFile, RawMessage
 from automax_ros.recordings.mcap.metadata import METADATA_FILE, BagMetadata
 from automax_ros.recordings.mcap.opening import NO_BAG_HINT, no_recording
-from automax_ros.recordings.read.reader import MAX_FILES, MAX_METADATA_BYTES, BagReader, file_place, read_information
+from automax_ros.recordings.read.information import MAX_FILES, MAX_METADATA_BYTES, file_place, read_information
+from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.read.soundness import verdict_of
 from automax_ros.recordings.repair.contents import FileContents, FileSequence, Provenance, topics_of
 from automax_ros.recordings.repair.rewriting import RepairWriter

@@ -29,8 +29,9 @@ from automax_ros.messages.types.messages import CommonWrite, Int16, VariableTabl
 from automax_ros.recordings.info.info import bag_info
 from automax_ros.recordings.mcap import mcap_file
 from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.information import MAX_METADATA_BYTES
 from automax_ros.recordings.read.playback import survey
-from automax_ros.recordings.read.reader import MAX_METADATA_BYTES, BagReader
+from automax_ros.recordings.read.reader import BagReader
 from automax_ros.recordings.repair.repairing import repair
 from recordings.recordings import TABLE, sample_recording
 

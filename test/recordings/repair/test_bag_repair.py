@@ -423,7 +423,7 @@ def test_what_repair_leaves_alone_info_does_not_send_there(tmp_path: Path) -> No
 
 
 def test_a_repaired_bag_of_many_topics_can_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("read.reader", "repair.repairing"):  # the real limit takes 20,000 topics
+    for module in ("read.information", "repair.repairing"):  # the real limit takes 20,000 topics
         monkeypatch.setattr(f"automax_ros.recordings.{module}.MAX_METADATA_BYTES", 1 << 15)
     bag = tmp_path / "bag"
     with BagWriter(bag) as writer:
