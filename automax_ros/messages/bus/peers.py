@@ -42,14 +42,17 @@ class PresenceVerdict(enum.Enum):
 class Peer:
     """Another process: its last presence, when that was received, and which of its batches have arrived.
 
-    ``short_since_ns`` is when announced batches were first missed, None as long as none is.
+    ``received`` is the number of the last one, by itself or in an image; ``lacking`` that of the last one that is known
+    to be missing, ``imaged`` that of the last one in an image. ``short_since_ns`` is when announced batches were first
+    missed, None as long as none is.
     """
 
     presence: Presence
     received_ns: int
     received: int = 0
+    lacking: int = 0
+    imaged: int = 0
     short_since_ns: int | None = None
-    gap: bool = False
 
     @property
     def process(self) -> int:
@@ -61,16 +64,22 @@ class Peer:
         """The stage that it has reached."""
         return self.presence.state
 
+    @property
+    def gap(self) -> bool:
+        """Whether batches are missing: an image that was sent before the last of them does not bring them."""
+        return self.lacking > self.imaged
+
     def got(self, sequence: int) -> None:
         """Note a batch that has arrived; a skipped number is a gap."""
-        self.gap = self.gap or sequence > self.received + 1
+        if sequence > self.received + 1:
+            self.lacking = sequence - 1
         self.received = max(self.received, sequence)
         self.short_since_ns = None
 
     def caught_up(self, sequence: int) -> None:
         """Note an image that contains its batches up to a number."""
-        self.received = max(self.received, sequence)
-        self.gap, self.short_since_ns = False, None
+        self.received, self.imaged = max(self.received, sequence), max(self.imaged, sequence)
+        self.short_since_ns = None
 
 
 @dataclass
@@ -121,7 +130,8 @@ class Peers:
         peer = self._short(presence)
         if peer is not None:
             peer.short_since_ns = now_ns if peer.short_since_ns is None else peer.short_since_ns
-            peer.gap = peer.gap or now_ns - peer.short_since_ns >= MISSING_NS
+            if now_ns - peer.short_since_ns >= MISSING_NS:
+                peer.lacking = max(peer.lacking, presence.sequence)
 
     def _short(self, presence: Presence) -> Peer | None:
         """Return the process whose latest presence this is, if it announces batches that were not received."""

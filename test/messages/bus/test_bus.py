@@ -175,6 +175,24 @@ def test_batches_that_did_not_come_are_noticed():
     assert not peers.is_short(word)
 
 
+def test_an_image_that_was_sent_before_a_batch_was_lost_does_not_bring_it():
+    """It was on its way when batch 7 was lost, and arrives after batch 8."""
+    peers = known()
+    peers.receive(said(sequence=0), 0)
+    peer = peers.of(5)
+    assert peer is not None
+    peer.got(1)
+    peer.got(4)
+    peer.got(5)
+    peer.got(6)
+    peer.got(8)
+    assert peers.owing() is peer
+    peer.caught_up(6)
+    assert peers.owing() is peer
+    peer.caught_up(7)
+    assert peers.owing() is None
+
+
 @pytest.mark.parametrize(
     "word", [said(run_id=43, sequence=9), said(fingerprint=2, sequence=9), said(9, 5, sequence=9), said(1, sequence=9)]
 )
